@@ -35,7 +35,7 @@ impl Atomic {
 
 /// A value of 32 bits, as it is in a buffer or in shared memory.
 pub trait Word: Copy + Send + Sync {
-    /// Its bits.
+    /// Bits of the word.
     fn bits(self) -> u32;
     /// The value with these bits.
     fn of(bits: u32) -> Self;

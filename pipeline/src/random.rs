@@ -18,6 +18,28 @@ pub const fn unit(word: u64) -> f64 {
     (word >> 11) as f64 / (1_u64 << 53) as f64
 }
 
+/// Sequence of SplitMix64 from a seed.
+#[derive(Clone, Copy, Debug)]
+pub struct SplitMix(u64);
+
+impl SplitMix {
+    /// The sequence from `seed`.
+    pub const fn new(seed: u64) -> Self {
+        Self(seed)
+    }
+
+    /// The next word.
+    pub const fn next_word(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(GOLDEN);
+        mix(self.0)
+    }
+
+    /// The next number in [0, 1).
+    pub const fn next_unit(&mut self) -> f64 {
+        unit(self.next_word())
+    }
+}
+
 /// A 64-bit word from a seed and two counters.
 pub(crate) const fn word(seed: u64, first: u64, second: u64) -> u64 {
     let inner = mix(seed.wrapping_add(GOLDEN.wrapping_mul(first.wrapping_add(1))));
@@ -31,8 +53,9 @@ mod tests {
     #[test]
     fn splitmix_reference_values() {
         // First outputs of SplitMix64 from seed 0, as published with the generator.
-        assert_eq!(mix(GOLDEN), 0xE220_A839_7B1D_CDAF);
-        assert_eq!(mix(GOLDEN.wrapping_mul(2)), 0x6E78_9E6A_A1B9_65F4);
+        let mut random = SplitMix::new(0);
+        assert_eq!(random.next_word(), 0xE220_A839_7B1D_CDAF);
+        assert_eq!(random.next_word(), 0x6E78_9E6A_A1B9_65F4);
     }
 
     #[test]

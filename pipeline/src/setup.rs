@@ -72,9 +72,9 @@ pub enum SetupResult {
     Ready(Triangle),
     /// Two of its corners coincide at all times.
     Degenerate,
-    /// It is nearer than the near depth at all times.
+    /// The triangle is nearer than the near depth at all times.
     Outside,
-    /// It is still and shows a culled face.
+    /// The triangle is still and shows a culled face.
     FaceCulled,
 }
 

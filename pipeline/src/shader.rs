@@ -6,7 +6,7 @@ use std::ops::{Add, Mul, Sub};
 use glam::{DAffine3, DVec3, Mat4, Vec2, Vec3, Vec4};
 
 use crate::buffer::{Buffer, Word};
-use crate::surface::{Bound, MAX_TARGETS};
+use crate::surface::{BoundSlot, MAX_TARGETS};
 use crate::tally::Costs;
 use crate::texture::Texture;
 
@@ -149,7 +149,7 @@ impl Lines {
     }
 }
 
-/// A lane of a warp. It computes what a shader asks for and counts the operations: a multiply-add, or
+/// A lane of a warp. It computes what a shader requests and counts the operations: a multiply-add, or
 /// anything simpler, of one component is one operation; so are a comparison, a reciprocal and a square root,
 /// as in the shader cores of the GPU files. Constants and the choice between programs that is the same for a
 /// whole draw are free.
@@ -159,7 +159,7 @@ pub struct Lane<'a> {
     branches: Cell<u32>,
     discarded: Cell<bool>,
     /// What the draw binds, by slot.
-    bound: &'a [Bound<'a>],
+    bound: &'a [BoundSlot<'a>],
     fetches: Cell<u32>,
     loads: Cell<u32>,
     /// Lines that were read, if they are of interest.
@@ -170,7 +170,7 @@ pub struct Lane<'a> {
 
 impl<'a> Lane<'a> {
     /// A lane that reads what a draw binds.
-    pub(crate) fn reading(bound: &'a [Bound<'a>]) -> Self {
+    pub(crate) fn reading(bound: &'a [BoundSlot<'a>]) -> Self {
         Self { bound, ..Self::default() }
     }
 
@@ -180,7 +180,7 @@ impl<'a> Lane<'a> {
     }
 
     /// A lane that reads what a draw binds, and notes the lines it reads.
-    pub(crate) fn noting(bound: &'a [Bound<'a>], lines: &'a RefCell<Lines>) -> Self {
+    pub(crate) fn noting(bound: &'a [BoundSlot<'a>], lines: &'a RefCell<Lines>) -> Self {
         Self { bound, lines: Some(lines), ..Self::default() }
     }
 

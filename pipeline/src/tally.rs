@@ -8,6 +8,8 @@ use std::cell::Cell;
 use std::cmp::Ordering;
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
+use crate::random::GOLDEN;
+
 /// Count of multiply-adds, by the convention of the sample test: a product and the sum it goes into are one;
 /// a separate addition, multiplication, division or root is one. Signs, magnitudes and comparisons are free.
 #[derive(Debug, Default)]
@@ -139,7 +141,7 @@ impl Costs {
 
     fn slot(&self, bits: u64) -> Option<&Cell<(u64, u32)>> {
         // Multiplicative hashing (Knuth 1973).
-        let hash = bits.wrapping_mul(0x9E37_79B9_7F4A_7C15) >> 32;
+        let hash = bits.wrapping_mul(GOLDEN) >> 32;
         self.0.get(hash as usize & self.0.len().saturating_sub(1))
     }
 }

@@ -46,21 +46,21 @@ mod table;
 use activity::spec::SpecError;
 
 pub use model::{Energy, FramePower, PARTS, Part, PowerModel};
-pub use pacing::{PacedFrame, Pacing, Run, pace};
+pub use pacing::{PacedFrame, PacedRun, Pacing, pace};
 pub use platform::{
-    Disturbance, Finish, Launch, Leakage, Platform, Provenance, Rail, Range, Ranges, ScaledFrom, System,
-    UnitPower,
+    Disturbance, Finish, Launch, Leakage, NumberProvenance, Platform, Rail, Range, Ranges, ScaledFrom,
+    System, UnitPower,
 };
 pub use quantity::{
     Basis, Bound, Celsius, Exponent, Hertz, Interval, OutOfRange, Picojoules, Quantity, Ratio, Seconds,
     Share, Source, Sourced, Volts, Watts,
 };
 pub use structure::{
-    Charge, Cost, Estimate, INTERPOLATION, LANE_MADDS, Memory, REGISTER_BYTES, Scaling, Sram, SramRun,
-    Structure, madds,
+    Charge, INTERPOLATION, IntervalNumber, LANE_MADDS, Memory, MemoryCost, REGISTER_BYTES, Scaling, Sram,
+    SramRun, Structure, madds,
 };
 pub use system::{Cause, Circumstances, Pulse, Surrounded, SurroundedFrame, overlay};
-pub use table::{EnergyRow, EnergyTable, Entry, Supply};
+pub use table::{EnergyRow, EnergyTable, Supply, TableEntry};
 
 /// Why an energy table cannot be used.
 #[derive(Debug, thiserror::Error)]
@@ -176,7 +176,7 @@ pub enum ModelError {
     Voltage {
         /// Platform.
         platform: String,
-        /// Its core voltage, V.
+        /// Core voltage of the platform, V.
         v_v: f64,
         /// Table.
         table: String,

@@ -46,7 +46,7 @@ pub struct PacedFrame {
 
 /// A whole run: its power curve, with idle time before and after, and its frames.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Run {
+pub struct PacedRun {
     /// Power from 0 s, including the recorded idle time before and after the frames.
     pub curve: Curve,
     /// The frames in order; each ends at the start of the next.
@@ -59,7 +59,7 @@ pub struct Run {
     pub warnings: Vec<Warning>,
 }
 
-impl Run {
+impl PacedRun {
     /// Energy from the start of the first frame to the end of the last one, summed frame by frame, in joules.
     pub fn energy(&self) -> Energy {
         self.frames.iter().fold(Energy::ZERO, |mut sum, frame| {
@@ -74,7 +74,7 @@ impl Run {
 /// # Errors
 /// [`PacingError::NoFrames`] for an empty list, [`PacingError::Curve`] if the run has length 0, and
 /// [`PacingError::TooLong`] if it lasts for months.
-pub fn pace(frames: &[&FramePower], platform: &Platform, pacing: Pacing) -> Result<Run, PacingError> {
+pub fn pace(frames: &[&FramePower], platform: &Platform, pacing: Pacing) -> Result<PacedRun, PacingError> {
     if frames.is_empty() {
         return Err(PacingError::NoFrames);
     }
@@ -89,7 +89,7 @@ pub fn pace(frames: &[&FramePower], platform: &Platform, pacing: Pacing) -> Resu
     let end_s = ledger.now_s();
     spend_idle(&mut ledger, to_ps(platform.tail_s.value()), platform)?;
     let warnings = schedule.warning(pacing).into_iter().collect();
-    Ok(Run { curve: ledger.close()?, frames: paced, start_s, end_s, warnings })
+    Ok(PacedRun { curve: ledger.close()?, frames: paced, start_s, end_s, warnings })
 }
 
 /// Append a frame and the idle time after it.

@@ -7,7 +7,7 @@
 use traces::{Curve, CurveError, stats};
 
 use crate::PacingError;
-use crate::pacing::{PacedFrame, Run};
+use crate::pacing::{PacedFrame, PacedRun};
 use crate::platform::{Disturbance, System};
 
 /// Cause of extra power.
@@ -40,7 +40,7 @@ impl Pulse {
         (self.end_s.min(to_s) - self.start_s.max(from_s)).max(0.0)
     }
 
-    /// Its energy in an interval, J.
+    /// Energy of the pulse in an interval, J.
     pub fn energy_j(&self, from_s: f64, to_s: f64) -> f64 {
         self.extra_w * self.overlap_s(from_s, to_s)
     }
@@ -105,7 +105,7 @@ pub struct SurroundedFrame {
     pub end_s: f64,
     /// Energy from start to end, J.
     pub energy_j: f64,
-    /// Its part caused by launch, finish and disturbances, J.
+    /// Part of the energy caused by launch, finish and disturbances, J.
     pub extra_j: f64,
 }
 
@@ -132,7 +132,7 @@ impl System {
     ///
     /// # Errors
     /// [`PacingError::TooDisturbed`] if there would be more than `MAX_PULSES` disturbances.
-    pub fn surround(&self, run: &Run, circumstances: &Circumstances) -> Result<Surrounded, PacingError> {
+    pub fn surround(&self, run: &PacedRun, circumstances: &Circumstances) -> Result<Surrounded, PacingError> {
         let mut pulses = self.disturbances(run.curve.start_s(), run.curve.end_s(), circumstances.seed)?;
         if let Some(launch) = self.launch.as_ref().filter(|_| circumstances.launch) {
             let (start_s, extra_w) = (run.start_s, launch.extra_w.value());

@@ -14,7 +14,7 @@ const BUILTIN: [(&str, &str); 1] = [("28nm", include_str!("../tables/28nm.ron"))
 
 /// Entry of one event.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Entry {
+pub enum TableEntry {
     /// The event has an energy.
     Costs(EnergyRow),
     /// The event has no energy of its own, for the given reason.
@@ -30,7 +30,7 @@ pub struct EnergyTable {
     v0_v: Volts,
     valid_v: [Volts; 2],
     /// Indexed by event.
-    entries: Vec<Entry>,
+    entries: Vec<TableEntry>,
 }
 
 /// A table as written in a file.
@@ -98,8 +98,8 @@ impl EnergyTable {
         if !(v_min_v <= v0_v && v0_v <= v_max_v) {
             return Err(EnergyTableError::Voltages { path: file.to_owned() });
         }
-        let costs = rows.into_iter().map(|row| (row.event(), Entry::Costs(row)));
-        let free = free.into_iter().map(|row| (row.event.0, Entry::Free(row.reason)));
+        let costs = rows.into_iter().map(|row| (row.event(), TableEntry::Costs(row)));
+        let free = free.into_iter().map(|row| (row.event.0, TableEntry::Free(row.reason)));
         let entries = complete(costs.chain(free), file)?;
         let node_nm = node_nm.get();
         Ok(Self { name, doc, node_nm, v0_v, valid_v: [v_min_v, v_max_v], entries })
@@ -133,17 +133,17 @@ impl EnergyTable {
     /// Rows with energies, in the order of [`Event::ALL`].
     pub fn rows(&self) -> impl Iterator<Item = &EnergyRow> {
         self.entries.iter().filter_map(|entry| match entry {
-            Entry::Costs(row) => Some(row),
-            Entry::Free(_) => None,
+            TableEntry::Costs(row) => Some(row),
+            TableEntry::Free(_) => None,
         })
     }
 
     /// The table for a GPU that differs from that of the platform by `scaling`.
     #[must_use]
     pub fn on(&self, scaling: &Scaling) -> Self {
-        let entry = |entry: &Entry| match entry {
-            Entry::Costs(row) => Entry::Costs(row.on(scaling)),
-            Entry::Free(reason) => Entry::Free(reason.clone()),
+        let entry = |entry: &TableEntry| match entry {
+            TableEntry::Costs(row) => TableEntry::Costs(row.on(scaling)),
+            TableEntry::Free(reason) => TableEntry::Free(reason.clone()),
         };
         Self { entries: self.entries.iter().map(entry).collect(), ..self.clone() }
     }
@@ -159,8 +159,11 @@ impl EnergyTable {
 }
 
 /// One entry per event in the order of [`Event::ALL`]. The error names a duplicate or missing event.
-fn complete(given: impl Iterator<Item = (Event, Entry)>, file: &str) -> Result<Vec<Entry>, EnergyTableError> {
-    let mut entries: Vec<Option<Entry>> = vec![None; Event::COUNT];
+fn complete(
+    given: impl Iterator<Item = (Event, TableEntry)>,
+    file: &str,
+) -> Result<Vec<TableEntry>, EnergyTableError> {
+    let mut entries: Vec<Option<TableEntry>> = vec![None; Event::COUNT];
     for (event, entry) in given {
         if entries[event as usize].replace(entry).is_some() {
             return Err(EnergyTableError::Duplicate { path: file.to_owned(), event: event.name() });
@@ -288,8 +291,8 @@ mod tests {
         let table = EnergyTable::builtin("28nm").unwrap();
         for (event, entry) in Event::ALL.into_iter().zip(&table.entries) {
             let text = match entry {
-                Entry::Costs(row) => row.source.text(),
-                Entry::Free(reason) => reason.text(),
+                TableEntry::Costs(row) => row.source.text(),
+                TableEntry::Free(reason) => reason.text(),
             };
             assert!(text.len() > 20, "{event:?}: `{text}` is no source");
         }

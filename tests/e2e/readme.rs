@@ -157,7 +157,7 @@ fn filters_of_tests_in_the_book_match_a_test() {
 
 /// The command that makes a picture of the book.
 fn command_of(picture: &str) -> String {
-    let is_of = |chart: &&experiments::study::Entry| picture.starts_with(&chart.name.replace('-', "_"));
+    let is_of = |chart: &&experiments::study::StudyEntry| picture.starts_with(&chart.name.replace('-', "_"));
     match experiments::CHARTS.iter().find(is_of) {
         Some(chart) => format!("quintile chart {}", chart.name),
         None if picture.starts_with("stress_") => "quintile stress".to_owned(),

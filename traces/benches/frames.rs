@@ -8,7 +8,7 @@ use traces::device::{Device, DeviceSpec};
 use traces::energy::FrameTable;
 use traces::frames::{FinderMethod, Marks, Window};
 use traces::io::{ReadOptions, parquet};
-use traces::pyramid::Pyramid;
+use traces::pyramid::PowerPyramid;
 use traces::{CurveBuilder, Trace, stream};
 
 fn main() -> Result<(), Box<dyn Error>> {
@@ -55,9 +55,9 @@ fn time(path: &Path, mark_s: f64) -> Result<(), Box<dyn Error>> {
         );
     }
     let clock = Instant::now();
-    let pyramid = Pyramid::of_file(path, &ReadOptions::default())?;
+    let pyramid = PowerPyramid::of_file(path, &ReadOptions::default())?;
     println!("pyramid: {:7.1} million samples/s", millions / clock.elapsed().as_secs_f64());
-    let kept = Pyramid::of_file(path, &ReadOptions::default())?;
+    let kept = PowerPyramid::of_file(path, &ReadOptions::default())?;
     let mut worst_ms = 0.0_f64;
     for zoom in 0..20 {
         let to_s = pyramid.end_s() / f64::from(1 << zoom);

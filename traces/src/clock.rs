@@ -10,7 +10,7 @@ const MAX_OFFSET_PERIODS: f64 = 0.25;
 
 /// Evenly spaced samples in time.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Clock {
+pub struct SampleClock {
     /// Left edge of the first sample, s.
     pub start_s: f64,
     /// Samples per second.
@@ -19,7 +19,7 @@ pub struct Clock {
     pub samples: Option<u64>,
 }
 
-impl Clock {
+impl SampleClock {
     /// Position of a time in samples, fractional.
     pub fn position(&self, time_s: f64) -> f64 {
         (time_s - self.start_s) * self.rate_hz
@@ -67,7 +67,7 @@ impl Clock {
 ///
 /// # Errors
 /// [`ReadError`] if it cannot be read or its first rows are not even.
-pub fn clock(path: &Path, options: &ReadOptions) -> Result<Clock, ReadError> {
+pub fn clock(path: &Path, options: &ReadOptions) -> Result<SampleClock, ReadError> {
     let mut rows = Rows::open(path, options)?;
     let samples = rows.count();
     let mut batch = RowBatch::default();
@@ -76,7 +76,7 @@ pub fn clock(path: &Path, options: &ReadOptions) -> Result<Clock, ReadError> {
     }
     let stated = rows.description.rate_hz.is_some();
     let first = grid(path, &batch.stamps, &rows.description)?;
-    let mut clock = Clock { start_s: first.start_s, rate_hz: first.rate_hz, samples };
+    let mut clock = SampleClock { start_s: first.start_s, rate_hz: first.rate_hz, samples };
     let Some(last) = samples.filter(|&n| !stated && n > FIRST_ROWS as u64).map(|n| n - 1) else {
         return Ok(clock);
     };
@@ -101,7 +101,7 @@ mod tests {
         samples: usize,
         rate_hz: f64,
         lost: Option<core::ops::Range<usize>>,
-    ) -> (Clock, Result<(), ReadError>) {
+    ) -> (SampleClock, Result<(), ReadError>) {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("t.parquet");
         let trace =

@@ -1,7 +1,7 @@
 //! Frontiers of time and energy (Paper IV): the settings that no other dominates.
 
 use crate::table::{InputTable, TableReadError};
-use crate::units::{Quantity, UnitError, scale_with};
+use crate::units::{ColumnQuantity, UnitError, scale_with};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::io::Write;
@@ -10,8 +10,8 @@ use thiserror::Error;
 
 /// One setting, measured.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Point {
-    /// Its name.
+pub struct ParetoPoint {
+    /// Name of the point.
     pub label: String,
     /// Time, s.
     pub time_s: f64,
@@ -28,7 +28,7 @@ pub struct Point {
 pub struct RatedPoint {
     /// The point; its energy is as given.
     #[serde(flatten)]
-    pub point: Point,
+    pub point: ParetoPoint,
     /// Energy including idling until the slowest setting is done, J: without idle power the energy as given.
     pub compensated_j: f64,
     /// Whether it is Pareto-optimal: no other is at least as good in both and better in one.
@@ -42,7 +42,7 @@ pub const DRAWS: u32 = 4096;
 
 /// Which points are on the frontier. With `idle_w`, the faster of two is charged idling for the time it saves
 /// (Paper IV, section 5): all are charged up to the slowest, so that any two are compared in the same way.
-pub fn frontier(points: &[Point], idle_w: f64, seed: u64) -> Vec<RatedPoint> {
+pub fn frontier(points: &[ParetoPoint], idle_w: f64, seed: u64) -> Vec<RatedPoint> {
     let slowest_s = points.iter().map(|point| point.time_s).fold(0.0, f64::max);
     let compensated = |time_s: f64, energy_j: f64| energy_j + idle_w * (slowest_s - time_s);
     let pairs: Vec<(f64, f64)> =
@@ -59,7 +59,7 @@ pub fn frontier(points: &[Point], idle_w: f64, seed: u64) -> Vec<RatedPoint> {
         let moved: Vec<(f64, f64)> = moved.collect();
         nondominated(&moved).iter().zip(&mut counts).for_each(|(on, count)| *count += u32::from(*on));
     }
-    let tradeoff = |(index, point): (usize, &Point)| RatedPoint {
+    let tradeoff = |(index, point): (usize, &ParetoPoint)| RatedPoint {
         point: point.clone(),
         compensated_j: pairs[index].1,
         on_frontier: on[index],
@@ -93,7 +93,7 @@ fn normal(seed: u64, draw: u64) -> (f64, f64) {
     crate::stats::Random::new(seed, 0).normals(draw)
 }
 
-impl Point {
+impl ParetoPoint {
     /// Mean power, W.
     pub fn power_w(&self) -> f64 {
         self.energy_j / self.time_s
@@ -167,15 +167,15 @@ pub fn frontiers(
         let values = table.numbers(column)?;
         Ok(values.into_iter().map(|value| value * scale).collect())
     };
-    let unit = |column: &str, of: Quantity| scale_with(column, table.unit(column), of);
+    let unit = |column: &str, of: ColumnQuantity| scale_with(column, table.unit(column), of);
     // A deviation without a unit in its name has that of the column it belongs to.
-    let deviations = |column: &Option<String>, (of, quantity): (&str, Quantity)| match column {
+    let deviations = |column: &Option<String>, (of, quantity): (&str, ColumnQuantity)| match column {
         Some(column) => numbers(column, unit(column, quantity)?.or(unit(of, quantity)?).unwrap_or(1.0)),
         None => Ok(vec![0.0; table.rows()]),
     };
     let texts = |column: &String| table.texts(column);
     let (time, energy) =
-        ((columns.time.as_str(), Quantity::Time), (columns.energy.as_str(), Quantity::Energy));
+        ((columns.time.as_str(), ColumnQuantity::Time), (columns.energy.as_str(), ColumnQuantity::Energy));
     let [times, energies] =
         [time, energy].map(|(column, of)| numbers(column, unit(column, of)?.unwrap_or(1.0)));
     let (times, energies) = (times?, energies?);
@@ -184,11 +184,11 @@ pub fn frontiers(
     let labels = columns.label.as_ref().map(texts).transpose()?;
     let keys = columns.groups.iter().map(texts).collect::<Result<Vec<_>, _>>()?;
     check_settings(table, &columns.time, &times, [&time_deviations, &energy_deviations])?;
-    let mut groups: BTreeMap<String, Vec<Point>> = BTreeMap::new();
+    let mut groups: BTreeMap<String, Vec<ParetoPoint>> = BTreeMap::new();
     for row in 0..table.rows() {
         let named =
             columns.groups.iter().zip(&keys).map(|(column, values)| format!("{column}={}", values[row]));
-        groups.entry(named.collect::<Vec<_>>().join(", ")).or_default().push(Point {
+        groups.entry(named.collect::<Vec<_>>().join(", ")).or_default().push(ParetoPoint {
             label: labels.as_ref().map_or_else(|| (row + 1).to_string(), |labels| labels[row].clone()),
             time_s: times[row],
             energy_j: energies[row],
@@ -262,9 +262,9 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    fn point(time_s: f64, energy_j: f64, deviation: f64) -> Point {
+    fn point(time_s: f64, energy_j: f64, deviation: f64) -> ParetoPoint {
         let label = String::new();
-        Point { label, time_s, energy_j, time_deviation_s: deviation, energy_deviation_j: deviation }
+        ParetoPoint { label, time_s, energy_j, time_deviation_s: deviation, energy_deviation_j: deviation }
     }
 
     #[test]

@@ -2,8 +2,8 @@
 
 use crate::energy::{FrameEnergy, PowerIntegral, clipped_current, negative_power};
 use crate::frames::{
-    FinderMethod, Found, MarkError, Marks, Options, Proposal, Window, default_window, find_with, propose,
-    repetition_samples,
+    FinderMethod, FinderOptions, Found, MarkError, Marks, Proposal, Window, default_window, find_with,
+    propose, repetition_samples,
 };
 use crate::io::{ReadError, ReadOptions, Rows};
 use crate::stream::{self, AnalysisError};
@@ -18,7 +18,7 @@ const MAX_BYTES_IN_MEMORY: u64 = 1 << 30;
 
 /// Which frames to find, and how.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Search {
+pub struct FrameSearch {
     /// Marked starts, s; without any, those of the trace's metadata.
     pub starts_s: Vec<f64>,
     /// Whether to [propose](propose()) a start instead.
@@ -39,7 +39,7 @@ pub struct Search {
 pub struct FrameSet {
     /// The frames.
     pub found: Found,
-    /// Their energies, in order.
+    /// Energies of the frames, in order.
     pub energies: Vec<FrameEnergy>,
     /// The metadata of the trace.
     pub metadata: Metadata,
@@ -97,8 +97,8 @@ impl From<AnalysisError> for SearchError {
     }
 }
 
-impl Search {
-    /// Whether a file is to be read in pieces, by [`Search::of_file`].
+impl FrameSearch {
+    /// Whether a file is to be read in pieces, by [`FrameSearch::of_file`].
     ///
     /// # Errors
     /// [`SearchError::NotInPieces`] if it is requested but not possible; [`SearchError::Read`].
@@ -132,7 +132,7 @@ impl Search {
         let window =
             self.window.unwrap_or_else(|| default_window(repetition_s.unwrap_or(0.0), trace.rate_hz()));
         let marks = Marks { starts_s, window, end_s };
-        let mut found = find_with(trace, &marks, &Options { method: self.method, without: None })?;
+        let mut found = find_with(trace, &marks, &FinderOptions { method: self.method, without: None })?;
         if let Some(Proposal { mark_s, .. }) = proposal.filter(|_| found.starts.len() < 2) {
             return Err(SearchError::NoRepetition { mark_s });
         }
@@ -217,8 +217,8 @@ mod tests {
         Trace::new(vec![1.0; 1600], (0..1600).map(watts).collect(), 5e3, 0.0, metadata).unwrap()
     }
 
-    fn search() -> Search {
-        Search {
+    fn search() -> FrameSearch {
+        FrameSearch {
             starts_s: Vec::new(),
             propose: false,
             window: Some(Window { pre_s: 1e-3, post_s: 4e-3 }),
@@ -234,7 +234,7 @@ mod tests {
         let set = search().of_trace(&trace(marks.clone())).unwrap();
         assert_eq!(set.energies.len(), 20);
         assert!((set.energies[3].duration_s() - PERIOD_S).abs() < 1e-5);
-        let given = Search { starts_s: vec![0.12, 0.11, 0.12], ..search() };
+        let given = FrameSearch { starts_s: vec![0.12, 0.11, 0.12], ..search() };
         assert_eq!(given.marked(&Metadata::default()).unwrap(), [0.11, 0.12]);
         assert_eq!(given.marked(&trace(marks).metadata).unwrap(), [0.11, 0.12]);
         assert!(matches!(search().of_trace(&trace(Vec::new())), Err(SearchError::Unmarked)));
@@ -245,7 +245,7 @@ mod tests {
         let all = trace(Vec::new());
         let reversed = all.current_a().iter().map(|amperes| -amperes).collect();
         let reversed = Trace::new(vec![1.0; 1600], reversed, 5e3, 0.0, Metadata::default()).unwrap();
-        let marked = Search { starts_s: vec![0.15], ..search() };
+        let marked = FrameSearch { starts_s: vec![0.15], ..search() };
         let negative = |trace: &Trace| {
             let set = marked.of_trace(trace).unwrap();
             set.found.warnings.iter().any(|warning| warning.code == "negative-power")
@@ -260,10 +260,10 @@ mod tests {
         let cut =
             Trace::new(vec![1.0; 1477], all.current_a()[..1477].to_vec(), 5e3, 0.0, Metadata::default())
                 .unwrap();
-        let marked = Search { starts_s: vec![0.15], ..search() };
+        let marked = FrameSearch { starts_s: vec![0.15], ..search() };
         let set = marked.of_trace(&cut).unwrap();
         assert_eq!((set.energies.len(), whole(&set.energies, set.ends_with_trace).len()), (20, 19));
-        let set = Search { end_s: Some(0.2954), ..marked }.of_trace(&cut).unwrap();
+        let set = FrameSearch { end_s: Some(0.2954), ..marked }.of_trace(&cut).unwrap();
         assert_eq!((set.energies.len(), whole(&set.energies, set.ends_with_trace).len()), (20, 20));
     }
 
@@ -272,7 +272,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let (path, options) = (folder.path().join("t.parquet"), ReadOptions::default());
         parquet::save(&trace(Vec::new()), &path).unwrap();
-        let marked = Search { starts_s: vec![0.15], in_pieces: true, ..search() };
+        let marked = FrameSearch { starts_s: vec![0.15], in_pieces: true, ..search() };
         let (whole, pieces) =
             (marked.of_trace(&trace(Vec::new())).unwrap(), marked.of_file(&path, &options).unwrap());
         assert_eq!((pieces.samples, pieces.rate_hz, pieces.start_s), (1600, 5e3, 0.0));
@@ -283,15 +283,15 @@ mod tests {
         assert_eq!(pieces.energies.len(), 20);
         assert!(marked.reads_in_pieces(&path, &options).unwrap());
         assert!(!search().reads_in_pieces(&path, &options).unwrap());
-        let tracking = Search { method: FinderMethod::Tracking, ..marked.clone() };
+        let tracking = FrameSearch { method: FinderMethod::Tracking, ..marked.clone() };
         assert!(matches!(tracking.reads_in_pieces(&path, &options), Err(SearchError::NotInPieces)));
-        let proposing = Search { propose: true, ..marked };
+        let proposing = FrameSearch { propose: true, ..marked };
         assert!(matches!(proposing.of_file(&path, &options), Err(SearchError::ProposalInPieces)));
     }
 
     #[test]
     fn a_proposal_has_to_come_back() {
-        let set = Search { propose: true, ..search() }.of_trace(&trace(Vec::new())).unwrap();
+        let set = FrameSearch { propose: true, ..search() }.of_trace(&trace(Vec::new())).unwrap();
         assert!(set.proposal.is_some() && set.energies.len() > 10);
         // One frame between noise.
         let random = crate::stats::Random::new(1, 0);
@@ -302,7 +302,7 @@ mod tests {
         };
         let watts = (0..20_000).map(watts).collect();
         let once = Trace::new(vec![1.0; 20_000], watts, 50e3, 0.0, Metadata::default()).unwrap();
-        let found = Search { propose: true, ..search() }.of_trace(&once);
+        let found = FrameSearch { propose: true, ..search() }.of_trace(&once);
         assert!(matches!(found, Err(SearchError::NoRepetition { .. })));
     }
 }

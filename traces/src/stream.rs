@@ -3,7 +3,7 @@
 //! The method is that of [`frames`](crate::frames) by the sum of squares or the normalized distance, to the
 //! bit: a trace in memory is searched in the same way.
 
-pub use crate::clock::{Clock, clock};
+pub use crate::clock::{SampleClock, clock};
 use crate::energy::FrameEnergy;
 use crate::frames::{
     FinderMethod, Found, FrameSpan, MarkError, Marks, MatchPlan, Matched, Placement, Samples,
@@ -23,10 +23,10 @@ const BATCH_ROWS: usize = 1 << 16;
 pub struct Streamed {
     /// The frames.
     pub found: Found,
-    /// Their energies, in order.
+    /// Energies of the frames, in order.
     pub energies: Vec<FrameEnergy>,
     /// When samples were taken, and how many.
-    pub clock: Clock,
+    pub clock: SampleClock,
     /// Energy of the whole trace, J.
     pub total_j: f64,
     /// The metadata of the file.
@@ -81,7 +81,7 @@ pub enum AnalysisError {
 struct InFile {
     rows: Rows,
     batch: RowBatch,
-    clock: Clock,
+    clock: SampleClock,
 }
 
 impl Samples for InFile {
@@ -111,7 +111,7 @@ fn windows(
     options: &ReadOptions,
     placement: &Placement,
     marks: &Marks,
-    clock: Clock,
+    clock: SampleClock,
 ) -> Result<Vec<Vec<f64>>, AnalysisError> {
     let mut windows = Vec::new();
     for (placed, &mark_s) in placement.marks.iter().zip(&marks.starts_s) {
@@ -136,7 +136,7 @@ mod tests {
     use crate::CurveBuilder;
     use crate::device::{Device, DeviceSpec};
     use crate::energy::PowerIntegral;
-    use crate::frames::{Options, Window, default_window, find_with};
+    use crate::frames::{FinderOptions, Window, default_window, find_with};
     use crate::io::parquet;
     use crate::trace::Trace;
 
@@ -163,16 +163,20 @@ mod tests {
         let path = folder.path().join("t.parquet");
         parquet::save(&trace, &path).unwrap();
         let window = default_window(0.01, trace.rate_hz());
-        let found = find_with(&trace, &Marks::one(0.05, window, trace.end_s()), &Options::default()).unwrap();
+        let found =
+            find_with(&trace, &Marks::one(0.05, window, trace.end_s()), &FinderOptions::default()).unwrap();
         let marks = Marks {
             starts_s: vec![found.starts[100].time_s, found.starts[2000].time_s],
             window,
             end_s: f64::INFINITY,
         };
         let in_memory = Marks { end_s: trace.end_s(), ..marks.clone() };
-        let expected =
-            find_with(&trace, &in_memory, &Options { method: FinderMethod::SumOfSquares, without: None })
-                .unwrap();
+        let expected = find_with(
+            &trace,
+            &in_memory,
+            &FinderOptions { method: FinderMethod::SumOfSquares, without: None },
+        )
+        .unwrap();
         let streamed = find(&path, &ReadOptions::default(), &marks, FinderMethod::SumOfSquares).unwrap();
         assert_eq!(streamed.found.starts.len(), expected.starts.len());
         assert!((streamed.found.threshold.value_w2 / expected.threshold.value_w2 - 1.0).abs() < 1e-2);
@@ -212,7 +216,7 @@ mod tests {
         parquet::save(&trace, &path).unwrap();
         let warned = |mark_s: f64, window: Window| {
             let marks = Marks::one(mark_s, window, trace.end_s());
-            let options = Options { method: FinderMethod::SumOfSquares, without: None };
+            let options = FinderOptions { method: FinderMethod::SumOfSquares, without: None };
             let [ours, theirs] = [
                 find(&path, &ReadOptions::default(), &marks, FinderMethod::SumOfSquares).unwrap().found,
                 find_with(&trace, &marks, &options).unwrap(),

@@ -243,7 +243,7 @@ pub(crate) fn check_times(samples: u64, rate_hz: f64, start_s: f64) -> Result<()
 /// A span of time that is not part of a trace.
 #[derive(Clone, Copy, Debug, Error, PartialEq)]
 pub enum SpanError {
-    /// It ends before it begins, or at once.
+    /// The span ends before it begins, or at once.
     #[error("{from_s} s to {to_s} s ends before it begins or has no length; give the earlier time first")]
     Reversed {
         /// Begin, s.
@@ -251,7 +251,7 @@ pub enum SpanError {
         /// End, s.
         to_s: f64,
     },
-    /// It is not within the trace.
+    /// The span is not within the trace.
     #[error("{from_s} s to {to_s} s is not within the trace, {start_s} s to {end_s} s; give times inside it")]
     Outside {
         /// Begin, s.
@@ -308,7 +308,7 @@ pub enum MarkKind {
 pub struct Mark {
     /// When, s.
     pub time_s: f64,
-    /// Its meaning.
+    /// Meaning of the mark.
     pub kind: MarkKind,
     /// Free text.
     #[serde(default, skip_serializing_if = "String::is_empty")]

@@ -8,7 +8,7 @@ use std::path::PathBuf;
 
 use cpu_time::ProcessTime;
 use workloads::collision::load_cases;
-use workloads::collision::{Object, Search, detect};
+use workloads::collision::{Object, PairSearch, detect};
 
 /// Measurements per scene; the median counts.
 const ROUNDS: usize = 5;
@@ -16,7 +16,7 @@ const ROUNDS: usize = 5;
 fn main() {
     let mut words = std::env::args().skip(1).filter(|word| word != "--bench");
     let Some(folder) = words.next() else { return println!("name the folder of the scenes") };
-    let mut search = Search::default();
+    let mut search = PairSearch::default();
     let mut number = |default| words.next().map_or(default, |word| word.parse().unwrap());
     (search.resolution, search.bins) = (number(search.resolution), number(search.bins));
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
@@ -39,7 +39,7 @@ fn main() {
             let may = answers.iter().filter(|answer| answer.verdict.may_collide()).count();
             let seen = answers
                 .iter()
-                .filter(|a| matches!(a.verdict, workloads::collision::Verdict::Maybe { seen: true, .. }))
+                .filter(|a| matches!(a.verdict, workloads::collision::PairVerdict::Maybe { seen: true, .. }))
                 .count();
             let triangles: usize = objects.iter().map(Object::len).sum();
             let product: f64 =

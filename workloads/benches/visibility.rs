@@ -9,9 +9,9 @@ use std::path::{Path, PathBuf};
 
 use cpu_time::ProcessTime;
 use glam::{Affine3A, Vec3};
-use pipeline::random::mix;
+use pipeline::random::{GOLDEN, SplitMix};
 use pipeline::sampling::HashedSamples;
-use pipeline::visibility::{SampleLayout, Tally, Visibility, resolve};
+use pipeline::visibility::{SampleLayout, StepTally, Visibility, resolve};
 use pipeline::{Camera, Cull, Geometry, Lens, LensShape, Viewport};
 
 /// Moving triangles and their camera.
@@ -23,13 +23,12 @@ struct Scene {
     triangles: Vec<[u32; 3]>,
 }
 
-/// Uniform random numbers from a counter.
-struct Uniform(u64);
+/// Uniform random numbers.
+struct Uniform(SplitMix);
 
 impl Uniform {
     fn within(&mut self, lo: f32, hi: f32) -> f32 {
-        self.0 += 1;
-        lo + (hi - lo) * ((mix(self.0.wrapping_mul(0x9E37_79B9_7F4A_7C15)) >> 40) as f32 / 16_777_216.0)
+        lo + (hi - lo) * ((self.0.next_word() >> 40) as f32 / 16_777_216.0)
     }
 
     fn offset(&mut self, size: f32) -> Vec3 {
@@ -59,7 +58,8 @@ const SOUPS: [Soup; 7] = [
 
 impl Soup {
     fn scene(&self) -> Scene {
-        let mut r = Uniform(u64::from(self.count) ^ u64::from(self.size.to_bits()));
+        let seed = u64::from(self.count) ^ u64::from(self.size.to_bits());
+        let mut r = Uniform(SplitMix::new(seed.wrapping_mul(GOLDEN)));
         let (mut open, mut close) = (Vec::new(), Vec::new());
         for _ in 0..self.count {
             let z = r.within(3.0, 30.0);
@@ -103,7 +103,7 @@ fn real_scene(path: &Path) -> Scene {
 }
 
 /// Median and best of several runs on so many threads.
-fn measure(scene: &Scene, threads: usize) -> (f64, f64, Tally) {
+fn measure(scene: &Scene, threads: usize) -> (f64, f64, StepTally) {
     const RUNS: usize = 7;
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
     pool.install(|| {
@@ -114,7 +114,7 @@ fn measure(scene: &Scene, threads: usize) -> (f64, f64, Tally) {
         let close = if moving { &scene.close } else { &scene.open };
         let geometry = Geometry::new(&scene.open, close, &scene.triangles).unwrap();
         let mut visibility = Visibility::new(&layout);
-        let mut tally = Tally::default();
+        let mut tally = StepTally::default();
         let mut seconds: Vec<f64> = (0..RUNS)
             .map(|_| {
                 let start = ProcessTime::now();

@@ -4,7 +4,7 @@
 //! - [`SharedSamples`]: the same samples in all pixels, which accumulation requires.
 //! - [`Snapshot`]: moving geometry at one time and one lens position, for a rendering without either.
 //! - [`pinhole`]: the camera at one lens position.
-//! - [`Rays`]: ray casting, as the ground truth of visibility and as a rival.
+//! - [`RayCaster`]: ray casting, as the ground truth of visibility and as a rival.
 
 use glam::{Affine3A, DVec3, Vec2, Vec3};
 use pipeline::geometry::Projection;
@@ -43,14 +43,14 @@ impl Face {
 
 /// Moving triangles for ray casting, numbered as in a pass, in a bounding volume hierarchy.
 #[derive(Clone, Debug, Default)]
-pub struct Rays {
+pub struct RayCaster {
     faces: Vec<Face>,
     tree: Bvh,
     /// Clip planes of each draw.
     clips: Vec<Clip>,
 }
 
-impl Rays {
+impl RayCaster {
     /// The triangles of `draws`.
     pub fn new(draws: &[Draw<'_>]) -> Self {
         let faces = draws.iter().enumerate().flat_map(|(draw, of)| {
@@ -272,7 +272,7 @@ mod tests {
     #[test]
     fn a_ray_hits_a_moving_triangle_at_its_time() {
         let at = |x: f32| [Vec3::new(x, -1.0, 2.0), Vec3::new(x + 2.0, -1.0, 2.0), Vec3::new(x, 3.0, 2.0)];
-        let rays = Rays::of(vec![Face { ends: [at(-4.5), at(3.5)], draw: 0 }], vec![Clip::NONE]);
+        let rays = RayCaster::of(vec![Face { ends: [at(-4.5), at(3.5)], draw: 0 }], vec![Clip::NONE]);
         let work = &mut RayWork::default();
         let mut first = |t| rays.first((DVec3::ZERO, DVec3::Z), t, 0.0, work);
         assert_eq!(first(0.5), Some((0, 2.0)));

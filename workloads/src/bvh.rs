@@ -318,18 +318,16 @@ pub(crate) fn hit(from: DVec3, along: DVec3, [a, b, c]: &[DVec3; 3]) -> Option<(
 
 #[cfg(test)]
 mod tests {
+    use pipeline::random::SplitMix;
+
     use super::*;
 
-    /// Uniform numbers from a simple recurrence.
-    struct Uniform(u64);
+    /// Uniform numbers.
+    struct Uniform(SplitMix);
 
     impl Uniform {
         fn point(&mut self, scale: f64) -> DVec3 {
-            DVec3::from_array([0; 3].map(|_| {
-                self.0 =
-                    self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-                ((self.0 >> 11) as f64 / (1_u64 << 53) as f64 - 0.5) * scale
-            }))
+            DVec3::from_array([0; 3].map(|_| (self.0.next_unit() - 0.5) * scale))
         }
     }
 
@@ -345,7 +343,7 @@ mod tests {
 
     /// Moving triangles of single-precision coordinates, some of them twice, some on a grid and in the plane y = 0.
     fn strewn(count: usize, seed: u64) -> Vec<Moving> {
-        let mut r = Uniform(seed);
+        let mut r = Uniform(SplitMix::new(seed));
         let mut faces: Vec<Moving> = Vec::new();
         for index in 0..count {
             let place = r.point(4.0);
@@ -366,7 +364,7 @@ mod tests {
     }
 
     fn rays(count: usize, seed: u64) -> impl Iterator<Item = Ray> {
-        let mut r = Uniform(seed);
+        let mut r = Uniform(SplitMix::new(seed));
         (0..count).map(move |index| {
             let t = (r.point(1.0).x + 0.5) as f32;
             let (mut from, mut along) = (r.point(6.0), r.point(2.0));

@@ -3,11 +3,11 @@
 use std::path::Path;
 
 use crate::error::LoadError;
-use crate::job::{FactKind, Flag, Flags, Job, OptionSource, Reduction, Request};
+use crate::job::{FactKind, Flag, Flags, Job, JobRequest, OptionSource, Reduction};
 use crate::rendering::Rendering;
 use crate::scene::Overrides;
 
-type Maker = fn(&OptionSource, &Request<'_>) -> Result<Box<dyn Job>, LoadError>;
+type Maker = fn(&OptionSource, &JobRequest<'_>) -> Result<Box<dyn Job>, LoadError>;
 
 /// Entry of a workload.
 struct Entry {
@@ -116,7 +116,7 @@ pub fn or_job(error: LoadError) -> LoadError {
 pub fn find(
     name: &str,
     options: &OptionSource,
-    request: &Request<'_>,
+    request: &JobRequest<'_>,
 ) -> Option<Result<Box<dyn Job>, LoadError>> {
     let job = JOBS.iter().find(|job| job.name == name)?;
     Some(job.flags.check(name, request.overrides).and_then(|()| (job.make)(options, request)))
@@ -130,7 +130,7 @@ pub fn find(
 pub fn load(
     name: &Path,
     options: &OptionSource,
-    request: &Request<'_>,
+    request: &JobRequest<'_>,
 ) -> Result<(String, Box<dyn Job>), LoadError> {
     // Names of workloads are Unicode; a path that is not cannot name one.
     let text = name.to_str().unwrap_or_default();
@@ -160,7 +160,7 @@ pub fn reduced<'a>(
     job: &'a dyn Job,
     name: &Path,
     options: &OptionSource,
-    request: &Request<'_>,
+    request: &JobRequest<'_>,
     to: &Reduction,
 ) -> Result<Box<dyn Job + 'a>, LoadError> {
     match job.reduced(to) {
@@ -176,7 +176,7 @@ pub fn reduced<'a>(
 pub fn remade(
     name: &str,
     options: &OptionSource,
-    request: &Request<'_>,
+    request: &JobRequest<'_>,
     to: &Reduction,
 ) -> Result<Box<dyn Job>, LoadError> {
     let entry = JOBS.iter().find(|job| job.name == name);
@@ -186,11 +186,11 @@ pub fn remade(
         Some(option) => options.set.push((option.to_owned(), to.size[1].to_string())),
         None => overrides.size = Some((to.size[0], to.size[1])),
     }
-    let own = || (entry.make)(&options, &Request { overrides: &overrides, ..*request });
+    let own = || (entry.make)(&options, &JobRequest { overrides: &overrides, ..*request });
     let samples = to.samples.filter(|_| entry.flags.uses.contains(&Flag::Samples));
     let Some(samples) = samples else { return own() };
     let fewer = Overrides { samples: Some(samples), ..overrides.clone() };
-    (entry.make)(&options, &Request { overrides: &fewer, ..*request }).or_else(|_| own())
+    (entry.make)(&options, &JobRequest { overrides: &fewer, ..*request }).or_else(|_| own())
 }
 
 #[cfg(test)]
@@ -230,7 +230,7 @@ mod tests {
         let entry = JOBS.iter().find(|job| job.name == name).unwrap();
         let size = entry.flags.uses.contains(&Flag::Size).then_some((16, 16));
         let overrides = Overrides { size, ..Overrides::default() };
-        let request = Request { overrides: &overrides, seed: 1 };
+        let request = JobRequest { overrides: &overrides, seed: 1 };
         let job = find(name, &OptionSource { file: None, set }, &request).unwrap().unwrap();
         let hardware = hardware();
         let drawn = job.frame(0, &mut Gpu::without_packets(&hardware).unwrap()).unwrap();

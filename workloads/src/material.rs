@@ -87,7 +87,7 @@ impl Material {
 /// Colours a material under a scene's light.
 ///
 /// The base colour is `texel * base * vertex colour`, the light that of [`Lighting::radiance`]. The vertex
-/// colour is left out unless [`SurfaceShader::with_vertex_colors`] asks for it. Opacity is computed for
+/// colour is left out unless [`SurfaceShader::with_vertex_colors`] requests it. Opacity is computed for
 /// materials that are not opaque.
 #[derive(Clone, Debug)]
 pub struct SurfaceShader {

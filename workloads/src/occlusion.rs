@@ -28,7 +28,8 @@ use warnings::{Code, Warning};
 
 use crate::error::LoadError;
 use crate::job::{
-    Drawn, Draws, Fact, Flag, Flags, Job, JobError, JobOptions, Need, OptionSource, Request, facts, must_hold,
+    Drawn, Draws, Fact, Flag, Flags, Job, JobError, JobOptions, JobRequest, Need, OptionSource, facts,
+    must_hold,
 };
 use crate::samples::SampleChoice;
 use crate::scene::Settings;
@@ -136,7 +137,7 @@ pub(crate) const FLAGS: Flags = Flags {
 ///
 /// # Errors
 /// [`LoadError`] for an invalid option or setting.
-pub fn job(options: &OptionSource, request: &Request<'_>) -> Result<Box<dyn Job>, LoadError> {
+pub fn job(options: &OptionSource, request: &JobRequest<'_>) -> Result<Box<dyn Job>, LoadError> {
     let options: OcclusionOptions = options.read()?;
     options.check()?;
     let settings = Settings { width: 512, height: 288, samples: 16, ..Settings::default() };

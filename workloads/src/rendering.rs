@@ -8,7 +8,7 @@ use pipeline::{Gpu, RasterPass, Viewport};
 use warnings::Warning;
 
 use crate::error::LoadError;
-use crate::job::{Drawn, Draws, IMAGE_SIZE, Job, JobError, Reduction, Request};
+use crate::job::{Drawn, Draws, IMAGE_SIZE, Job, JobError, JobRequest, Reduction};
 use crate::regime::Regime;
 use crate::samples::{SampleChoice, blur_warning};
 use crate::scene::{Frame, FrameMesh, Scene, Settings};
@@ -30,7 +30,7 @@ impl Rendering {
     ///
     /// # Errors
     /// [`LoadError`] if a setting or the sample table is invalid.
-    pub fn new(scene: Scene, request: &Request<'_>) -> Result<Self, LoadError> {
+    pub fn new(scene: Scene, request: &JobRequest<'_>) -> Result<Self, LoadError> {
         let scene = scene.with_overrides(request.overrides)?;
         let mut settings = scene.settings().clone();
         let table = SampleChoice::load(&settings.table)?;
@@ -144,7 +144,7 @@ mod tests {
 
     fn tiny() -> Rendering {
         let overrides = Overrides { size: Some((64, 36)), samples: Some(4), ..Overrides::default() };
-        Rendering::new(crate::load("tiny").unwrap(), &Request { overrides: &overrides, seed: 1 }).unwrap()
+        Rendering::new(crate::load("tiny").unwrap(), &JobRequest { overrides: &overrides, seed: 1 }).unwrap()
     }
 
     #[test]

@@ -40,7 +40,7 @@ impl PacketStream {
         Self { bytes, packets }
     }
 
-    /// Its bytes.
+    /// The packets as bytes.
     pub fn bytes(&self) -> &[u8] {
         &self.bytes
     }

@@ -254,7 +254,7 @@ pub enum Fault {
 /// What a group did.
 #[derive(Debug)]
 pub(crate) struct GroupLog {
-    /// Its events, without those of lines.
+    /// Events of the group, without those of lines.
     pub counts: PacketCounts,
     pub lines: Vec<LineTouch>,
     /// Stores and atomics that have yet to take effect.

@@ -76,7 +76,7 @@ pub(super) fn account(
     accesses.clear();
 }
 
-/// A bank gives one word a cycle, to all lanes that ask for it. Atomics take a cycle each, and two accesses.
+/// A bank gives one word a cycle, to all lanes that request it. Atomics take a cycle each, and two accesses.
 fn shared(accesses: &[LaneAccess], banks: u32, counts: &mut PacketCounts) {
     let is_atomic = accesses[0].kind == AccessKind::SharedAtomic;
     let mut in_bank = vec![0_u32; banks as usize];

@@ -5,7 +5,7 @@ use std::ops::{AddAssign, Range};
 use super::{MovingTriangle, Precision, Rect, Region, Rounded, Touch, View, recentring_madds};
 use crate::depth::{DepthBound, ExactBounder, exact_interval_madds, set_up_madds};
 use crate::traversal::{
-    Box5, EdgeBounds, Edges, TileRect, View as Seen, edge_bound_madds, edge_madds, narrow_by_sides,
+    Box5, EdgeBounds, Edges, TileRect, TileView as Seen, edge_bound_madds, edge_madds, narrow_by_sides,
     narrow_near,
 };
 

@@ -3,7 +3,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{Beam, MovingPlane, Points, Real, both, cross, hull, normal, range, sides, tightest};
+use super::{LensRays, MovingPlane, Points, Real, both, cross, hull, normal, range, sides, tightest};
 use crate::geometry::Shear;
 use crate::setup::Triangle;
 use crate::traversal::{Box5, Coordinate, TileRect};
@@ -224,12 +224,12 @@ impl<R: Real> Facts<R> {
         planes.map_or(vertices, |planes| both(vertices, planes))
     }
 
-    fn beam(&self, region: &Region<R>) -> Beam<R> {
+    fn beam(&self, region: &Region<R>) -> LensRays<R> {
         match (region.lens, self.parallel) {
-            (Some(lens), false) => Beam::lens(region.tile, lens, self.s, self.a),
-            (None, false) => Beam::pinhole(region.tile),
-            (Some(lens), true) => Beam::oblique(region.tile, lens, self.s, self.a),
-            (None, true) => Beam::orthographic(region.tile),
+            (Some(lens), false) => LensRays::lens(region.tile, lens, self.s, self.a),
+            (None, false) => LensRays::pinhole(region.tile),
+            (Some(lens), true) => LensRays::oblique(region.tile, lens, self.s, self.a),
+            (None, true) => LensRays::orthographic(region.tile),
         }
     }
 
@@ -246,7 +246,7 @@ impl<R: Real> Facts<R> {
         &self,
         shutter: Option<&[MovingPlane<R>; 2]>,
         region: &Region<R>,
-        beam: &Beam<R>,
+        beam: &LensRays<R>,
         ends: &[Points<R>; 2],
         margin: &Margin<R>,
     ) -> Option<[R; 2]> {
@@ -296,7 +296,7 @@ struct Margin<R> {
 /// Margin of a triangle with the given vertices at the two ends of a time interval (one end if it is still),
 /// with the slack of its set-up; `deepest` bounds the depth of the vertices. `None` if its area as seen may
 /// be a rounding error.
-fn margin<R: Real>(ends: &[Points<R>], beam: &Beam<R>, slack: [R; 2], deepest: R) -> Option<Margin<R>> {
+fn margin<R: Real>(ends: &[Points<R>], beam: &LensRays<R>, slack: [R; 2], deepest: R) -> Option<Margin<R>> {
     let slopes = beam.slopes();
     let [wide, high] = [0, 1].map(|axis| extent(ends, axis, slopes[axis]) + slack[axis]);
     let unsure = R::new(13.0 * HALF_ULP).madd(wide * high, R::new(UNDERFLOW_LOSS));
@@ -500,7 +500,9 @@ mod tests {
                 continue;
             }
             let ends = [p.map(|p| p.map(f64::from))];
-            let Some(margin) = margin(&ends, &Beam::pinhole([[0.0; 2]; 2]), [0.0; 2], 1.0) else { continue };
+            let Some(margin) = margin(&ends, &LensRays::pinhole([[0.0; 2]; 2]), [0.0; 2], 1.0) else {
+                continue;
+            };
             let sum: f64 = e.iter().sum();
             for axis in [0, 1] {
                 let off = (0..3).map(|k| e[k] * ends[0][k][axis]).sum::<f64>() / sum;
@@ -514,7 +516,7 @@ mod tests {
 
     #[test]
     fn a_triangle_as_thin_as_the_rounding_of_its_vertices_has_no_margin() {
-        let beam = Beam::pinhole([[0.0; 2]; 2]);
+        let beam = LensRays::pinhole([[0.0; 2]; 2]);
         let thin = |height: f64| [[[0.0, 0.0, 1.0], [1.0, 0.0, 1.0], [0.5, height, 1.0]]];
         // Twice the area is the height; each of six products may be off by half a slack times an extent of
         // about one.

@@ -235,12 +235,12 @@ pub struct Rays<R> {
 
 /// Rays of a tile from a part of the lens, one set per corner of that part.
 #[derive(Clone, Copy, Debug)]
-pub struct Beam<R> {
+pub struct LensRays<R> {
     rays: [Rays<R>; 4],
     corners: usize,
 }
 
-impl<R: Real> Beam<R> {
+impl<R: Real> LensRays<R> {
     /// Rays through a pinhole; `tile` has the ranges of X and Y.
     pub fn pinhole(tile: [[R; 2]; 2]) -> Self {
         Self::single(Rays { slope: tile, base: [[R::new(0.0); 2]; 2] })
@@ -343,7 +343,7 @@ impl<R: Real> MovingPlane<R> {
 
     /// Depth range in which a ray of the beam meets points with `n . p` in `reach` that are at most `off`
     /// from the ray in x and y. `None` if the plane may be seen edge-on, which gives no bound.
-    pub fn depths(&self, reach: [R; 2], beam: &Beam<R>, off: [R; 2]) -> Option<[R; 2]> {
+    pub fn depths(&self, reach: [R; 2], beam: &LensRays<R>, off: [R; 2]) -> Option<[R; 2]> {
         let [nx, ny, _] = self.normal;
         let slack = nx.magnitude().madd(off[0], ny.magnitude().madd(off[1], self.noise));
         let reach = [reach[0] - slack, reach[1] + slack];
@@ -436,12 +436,12 @@ mod tests {
     #[test]
     fn a_triangle_parallel_to_the_screen_is_bounded_by_its_depth() {
         let plane = MovingPlane::new(normal(&OPEN), [&OPEN, &CLOSE], SIZE);
-        let beam = Beam::pinhole(TILE);
+        let beam = LensRays::pinhole(TILE);
         close_to(plane.depths(plane.whole(), &beam, [0.0; 2]).unwrap(), [2.0, 4.0]);
         close_to(plane.depths(plane.within([0.25, 0.5]), &beam, [0.0; 2]).unwrap(), [2.5, 3.0]);
-        let lens = Beam::lens(TILE, [[-1.0, 1.0]; 2], [3.0, -3.0], [0.5, -0.5]);
+        let lens = LensRays::lens(TILE, [[-1.0, 1.0]; 2], [3.0, -3.0], [0.5, -0.5]);
         close_to(plane.depths(plane.within([0.25, 0.5]), &lens, [0.0; 2]).unwrap(), [2.5, 3.0]);
-        let parallel = Beam::orthographic(TILE);
+        let parallel = LensRays::orthographic(TILE);
         close_to(plane.depths(plane.within([0.25, 0.5]), &parallel, [0.0; 2]).unwrap(), [2.5, 3.0]);
     }
 
@@ -450,16 +450,16 @@ mod tests {
     fn a_slanted_plane_is_bounded_at_the_corners_of_the_tile() {
         let points = [[0.0, 0.0, 4.0], [1.0, 0.0, 5.0], [0.0, 1.0, 4.0]];
         let plane = MovingPlane::new(normal(&points), [&points, &points], [1.0, 1.0, 5.0]);
-        let depths = |beam: &Beam<f64>| plane.depths(plane.whole(), beam, [0.0; 2]);
-        close_to(depths(&Beam::pinhole(TILE)).unwrap(), [4.0 / 1.5, 8.0]);
-        close_to(depths(&Beam::orthographic(TILE)).unwrap(), [3.5, 4.5]);
-        assert!(depths(&Beam::pinhole([[0.5, 1.5], [0.0, 1.0]])).is_none(), "seen edge-on at X = 1");
+        let depths = |beam: &LensRays<f64>| plane.depths(plane.whole(), beam, [0.0; 2]);
+        close_to(depths(&LensRays::pinhole(TILE)).unwrap(), [4.0 / 1.5, 8.0]);
+        close_to(depths(&LensRays::orthographic(TILE)).unwrap(), [3.5, 4.5]);
+        assert!(depths(&LensRays::pinhole([[0.5, 1.5], [0.0, 1.0]])).is_none(), "seen edge-on at X = 1");
         // From u on a lens with s = 2, F = 4: w (1 - (X - u / 2)) = 4 + 2 u.
-        let lens = Beam::lens(TILE, [[-1.0, 0.5], [0.0, 0.0]], [2.0, 2.0], [0.5, 0.5]);
+        let lens = LensRays::lens(TILE, [[-1.0, 0.5], [0.0, 0.0]], [2.0, 2.0], [0.5, 0.5]);
         let at = |x: f64, u: f64| (4.0 + 2.0 * u) / (1.0 - x + 0.5 * u);
         let corners = range([at(-0.5, -1.0), at(0.5, -1.0), at(-0.5, 0.5), at(0.5, 0.5)]);
         assert!(depths(&lens).is_none(), "seen edge-on from u = -1 at X = 1/2");
-        let lens = Beam::lens([[-0.5, 0.25], TILE[1]], [[-1.0, 0.5], [0.0, 0.0]], [2.0, 2.0], [0.5, 0.5]);
+        let lens = LensRays::lens([[-0.5, 0.25], TILE[1]], [[-1.0, 0.5], [0.0, 0.0]], [2.0, 2.0], [0.5, 0.5]);
         let inner = range([at(-0.5, -1.0), at(0.25, -1.0), at(-0.5, 0.5), at(0.25, 0.5)]);
         assert!(corners[1] > inner[1]);
         close_to(depths(&lens).unwrap(), inner);
@@ -471,7 +471,7 @@ mod tests {
     fn an_oblique_view_is_bounded_at_the_corners_of_tile_and_lens() {
         let points = [[0.0, 0.0, 4.0], [1.0, 0.0, 5.0], [0.0, 1.0, 4.0]];
         let plane = MovingPlane::new(normal(&points), [&points, &points], [1.0, 1.0, 5.0]);
-        let beam = Beam::oblique(TILE, [[-1.0, 0.5], [0.0, 0.0]], [2.0, 2.0], [0.5, 0.5]);
+        let beam = LensRays::oblique(TILE, [[-1.0, 0.5], [0.0, 0.0]], [2.0, 2.0], [0.5, 0.5]);
         let at = |x: f64, u: f64| (4.0 + x + 2.0 * u) / (1.0 + 0.5 * u);
         let corners = range([at(-0.5, -1.0), at(0.5, -1.0), at(-0.5, 0.5), at(0.5, 0.5)]);
         close_to(plane.depths(plane.whole(), &beam, [0.0; 2]).unwrap(), corners);
@@ -486,7 +486,7 @@ mod tests {
         let size = [24.0 * units[0], 3.0 * units[1], 84.0 * units[2]];
         let plane = MovingPlane::new(normal(&points), [&points, &points], size);
         for [x, y, w] in points {
-            let found = plane.depths(plane.whole(), &Beam::orthographic([[x; 2], [y; 2]]), [0.0; 2]);
+            let found = plane.depths(plane.whole(), &LensRays::orthographic([[x; 2], [y; 2]]), [0.0; 2]);
             assert!(found.is_none_or(|[lo, hi]| lo <= w && w <= hi), "{w} in {found:?}");
         }
     }
@@ -497,7 +497,7 @@ mod tests {
         let points = [[0.0, 0.0, 4.0], [1.0, 0.0, 5.0], [0.0, 1.0, 4.0]];
         let plane = MovingPlane::new(normal(&points), [&points, &points], [1.0, 1.0, 5.0]);
         let tile = [[1.0, 1.2], [0.0, 0.1]];
-        let from = |u| Beam::lens(tile, [u, [0.0; 2]], [2.0; 2], [0.5; 2]);
+        let from = |u| LensRays::lens(tile, [u, [0.0; 2]], [2.0; 2], [0.5; 2]);
         assert!(plane.depths(plane.whole(), &from([1.0; 2]), [0.0; 2]).is_some());
         assert!(plane.depths(plane.whole(), &from([-1.0; 2]), [0.0; 2]).is_some());
         assert!(plane.depths(plane.whole(), &from([-1.0, 1.0]), [0.0; 2]).is_none());

@@ -46,7 +46,7 @@ pub enum Store {
     /// Later passes may read it, and it is in memory when the frame ends.
     #[default]
     Store,
-    /// It is dropped, and not written to memory.
+    /// The target is dropped, and not written to memory.
     Discard,
 }
 
@@ -263,10 +263,10 @@ pub enum PassError {
 /// Why a pass cannot use a surface.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum SurfaceProblem {
-    /// It is of another GPU.
+    /// The surface is of another GPU.
     #[error("the frame has no such surface; use one that `Gpu::create_surface` returned in this frame")]
     Unknown,
-    /// It is read and written.
+    /// The surface is read and written.
     #[error(
         "it is read and written in the same pass: {reader} reads it, and {writer} writes it; draw to another surface"
     )]
@@ -285,16 +285,16 @@ pub enum SurfaceProblem {
     /// The samples differ.
     #[error("it has {0} samples per pixel, but the pass has {1}; make both the same")]
     Samples(u32, u32),
-    /// It has several levels and several samples.
+    /// The surface has several levels and several samples.
     #[error("it has {0} levels and {1} samples per pixel; resolve the samples into a surface with levels")]
     Levels(u32, u32),
-    /// It is a target twice.
+    /// The surface is a target twice.
     #[error("it is a target of the pass twice; remove one of them")]
     Twice,
     /// The pass has too many targets.
     #[error("it is one colour target too many; a pass has up to {MAX_TARGETS}")]
     TooMany,
-    /// Its format does not fit the target.
+    /// The surface's format does not fit the target.
     #[error("its format {0:?} is not one of {1}")]
     Format(Format, &'static str),
     /// Colours in it cannot be combined.
@@ -307,7 +307,7 @@ pub enum SurfaceProblem {
         /// The format.
         format: Format,
     },
-    /// It has no stencil values.
+    /// The surface has no stencil values.
     #[error("draw {draw} has a stencil test, but format {format:?} has no stencil values; use D24S8")]
     Stencil {
         /// The draw.

@@ -5,7 +5,7 @@ use crate::sample_test::{Crossing, SampleRows, View};
 use crate::sampling::TileSamples;
 use crate::setup::Corner;
 use crate::shading::{REFERENCE_TIME, cell_at, places};
-use crate::simd::{Kernel, LANES, Lanes, Mask, Width, dispatch};
+use crate::simd::{Kernel, LANES, Lanes, Mask, VectorWidth, dispatch};
 
 /// Shading grid over one triangle, for the samples of one tile.
 pub(super) struct Grid<'a> {
@@ -68,7 +68,7 @@ impl<'a> Grid<'a> {
         let first = found.len();
         let mut in_front = true;
         let (grid, all_in_front) = (self, &mut in_front);
-        dispatch(Width::widest(), CellsOf { grid, slots, found, all_in_front });
+        dispatch(VectorWidth::widest(), CellsOf { grid, slots, found, all_in_front });
         if !in_front {
             let cells = found[first..].iter_mut().zip(slots);
             cells.filter(|(cell, _)| **cell == BEHIND).for_each(|(cell, slot)| *cell = own(slot));
@@ -80,7 +80,7 @@ impl<'a> Grid<'a> {
         self.cells.base = base;
         let Self { corners, reference, image, samples, .. } = *self;
         let (rows, cells) = (SampleRows::of(samples, base), &mut self.cells);
-        dispatch(Width::widest(), Block { corners, reference: &reference, image, rows, cells });
+        dispatch(VectorWidth::widest(), Block { corners, reference: &reference, image, rows, cells });
     }
 }
 

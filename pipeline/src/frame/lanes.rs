@@ -95,7 +95,7 @@ impl Lanes {
         result
     }
 
-    /// The programs since it was last asked, which are then not counted as those of single lanes.
+    /// The programs since the last call, which are then not counted as those of single lanes.
     pub(super) fn take_runs(&self) -> Vec<Run> {
         self.runs.take()
     }
@@ -202,7 +202,7 @@ impl Lanes {
         self.touches.borrow_mut().push(touch);
     }
 
-    /// What the lanes did since they were last asked. Those of a program fill warps of `warp_lanes` lanes in
+    /// What the lanes did since the last call. Those of a program fill warps of `warp_lanes` lanes in
     /// the order in which they ran.
     pub(super) fn finish(&self, warp_lanes: u32) -> LaneWork {
         let runs = self.runs.take();

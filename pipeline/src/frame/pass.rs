@@ -15,7 +15,7 @@ use crate::sampling::TileSamples;
 use crate::setup::Corner;
 use crate::shader::{Program, Shader};
 use crate::state::{Clear, DepthState, DrawState};
-use crate::surface::{Bound, Format, MAX_TARGETS, Texels};
+use crate::surface::{BoundSlot, Format, MAX_TARGETS, Texels};
 use crate::texture::{Sampler, Texture};
 use crate::traversal::{LensSpans, at_rest, blur_px, motion_px};
 
@@ -48,7 +48,7 @@ pub(super) struct Pass<'a> {
     /// Operations of the shader of each draw.
     pub programs: Vec<Program>,
     /// What the shader of each draw reads, by slot.
-    pub bound: Vec<Vec<Bound<'a>>>,
+    pub bound: Vec<Vec<BoundSlot<'a>>>,
     /// Depths of samples. Without a place they are not in memory.
     pub depth: Plane,
     /// Colours of samples, by target. Without any the pass computes depths only.
@@ -284,9 +284,9 @@ pub(super) struct Plane {
 
 /// Values before the first draw of a pass.
 pub(super) enum First {
-    /// Each the same.
+    /// The same value everywhere.
     Cleared(Vec4),
-    /// Those of an earlier pass.
+    /// The values that an earlier pass left.
     Loaded(Arc<Texels>),
 }
 
@@ -381,14 +381,14 @@ fn bound<'a>(
     addresses: &AddressMap,
     (surfaces, buffers): (&Surfaces, &Buffers),
     space: &mut AddressSpace,
-) -> Vec<Vec<Bound<'a>>> {
+) -> Vec<Vec<BoundSlot<'a>>> {
     let own = draws.iter().map(|draw| draw.shader.texture());
     let own =
         own.zip(&addresses.textures).filter_map(|(texture, at)| Some((std::ptr::from_ref(texture?), (*at)?)));
     let mut known = TextureAddresses(own.collect());
     let mut bind = |binding: &Binding<'a>| match *binding {
         Binding::Texture(texture) => {
-            Some(Bound::texture(Sampler::new(texture, known.of(texture, None, space))))
+            Some(BoundSlot::texture(Sampler::new(texture, known.of(texture, None, space))))
         }
         Binding::Surface(_) | Binding::Levels(_) => {
             let stored = |id| {
@@ -396,9 +396,9 @@ fn bound<'a>(
                 Some((Arc::clone(state.texels.as_ref()?), state.layout))
             };
             let levels = surfaces.read_by(binding).into_iter().map(stored);
-            Some(Bound::surface(levels.collect::<Option<_>>()?))
+            Some(BoundSlot::surface(levels.collect::<Option<_>>()?))
         }
-        Binding::Buffer(ref binding) => Some(Bound::buffer(buffers.bound(binding)?)),
+        Binding::Buffer(ref binding) => Some(BoundSlot::buffer(buffers.bound(binding)?)),
     };
     draws.iter().map(|draw| draw.bindings.iter().filter_map(&mut bind).collect()).collect()
 }
@@ -451,7 +451,7 @@ pub(super) fn resident<'s>(
     })
 }
 
-/// An occlusion query: what is asked about the samples of a draw.
+/// An occlusion query: what is found about the samples of a draw.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Query {
     /// How many samples pass.
@@ -477,7 +477,7 @@ pub struct Draw<'a> {
     pub bindings: &'a [Binding<'a>],
     /// Addresses of its data, if an earlier pass of the frame has used them.
     pub resident: Resident,
-    /// What is asked about its samples, if anything.
+    /// What is found about its samples, if it is an occlusion query.
     pub query: Option<Query>,
 }
 
@@ -502,7 +502,7 @@ impl<'a> Draw<'a> {
 
     /// The draw as an occlusion query, which stores nothing. Depths are compared as its state says.
     #[must_use]
-    pub fn asking(self, query: Query) -> Self {
+    pub fn with_query(self, query: Query) -> Self {
         let depth = DepthState { write: false, ..self.state.depth };
         let others = Default::default();
         let state = DrawState { depth, colour_mask: [false; 4], others, ..self.state };

@@ -116,7 +116,7 @@ impl<'a> IntervalQueries<'a> {
 
     /// Whether the box, and everything inside, is hidden. Ends at the first tile of the first level that may
     /// see it.
-    pub fn ask(&self, object: &MovingBox) -> IntervalAnswer {
+    pub fn query(&self, object: &MovingBox) -> IntervalAnswer {
         let mut answer = IntervalAnswer::default();
         let [open, close] = object.corners();
         let vertices: [MovingVertex; 8] = std::array::from_fn(|n| self.projection.vertex(open[n], close[n]));
@@ -256,7 +256,7 @@ impl Gpu<'_> {
         }
     }
 
-    /// Asks about boxes in a pass of its own. A query ends at its first tile that may see the box. The unit
+    /// Queries boxes in a pass of its own. A query ends at its first tile that may see the box. The unit
     /// of depth writes the answers to memory, a word each.
     pub fn query_boxes(
         &mut self,
@@ -267,12 +267,12 @@ impl Gpu<'_> {
         let corners = self.allocate(objects.len() as u64 * u64::from(CORNERS * CORNER_BYTES));
         let written = self.allocate(objects.len() as u64 * ANSWER_BYTES);
         self.open(name, None);
-        let answers: Vec<_> = objects.iter().map(|object| queries.ask(object)).collect();
+        let answers: Vec<_> = objects.iter().map(|object| queries.query(object)).collect();
         let size = self.spec().batch_triangles;
-        let asked: Vec<_> = (0..).zip(&answers).collect();
+        let queried: Vec<_> = (0..).zip(&answers).collect();
         let batch = |number: u32| FACES.len() as u32 * number / size;
         // All boxes of a batch are set up before the first is traversed.
-        for boxes in asked.chunk_by(|&(before, _), &(number, _)| batch(before) == batch(number)) {
+        for boxes in queried.chunk_by(|&(before, _), &(number, _)| batch(before) == batch(number)) {
             boxes.iter().for_each(|&(number, answer)| {
                 self.box_vertices(number, queries.projection, answer, corners);
             });
@@ -297,13 +297,13 @@ impl Gpu<'_> {
 
     /// Writes the answers of the queries among the draws of the last pass; `false` if there are none.
     pub(super) fn write_answers(&mut self, draws: &[Draw<'_>]) -> bool {
-        let asked: Vec<u32> =
+        let queried: Vec<u32> =
             (0..).zip(draws).filter(|(_, draw)| draw.query.is_some()).map(|(number, _)| number).collect();
-        if asked.is_empty() {
+        if queried.is_empty() {
             return false;
         }
-        let answers = self.allocate(asked.len() as u64 * ANSWER_BYTES);
-        for (number, draw) in (0..).zip(asked) {
+        let answers = self.allocate(queried.len() as u64 * ANSWER_BYTES);
+        for (number, draw) in (0..).zip(queried) {
             let mut packet = Packet { draw, ..self.packet(PacketKind::Tile, Packet::NONE, None) };
             self.write_answer(number, answers, &mut packet.counts);
             self.push(&packet, 0);
@@ -429,12 +429,12 @@ impl Shader for Counted {
 }
 
 impl SampledQueries<'_> {
-    /// Asks about boxes, one after the other, over what the occluders stored. All culling of the hardware
+    /// Queries boxes, one after the other, over what the occluders stored. All culling of the hardware
     /// works as for other draws.
     ///
     /// # Errors
     /// [`PassError`] if the hardware cannot draw it.
-    pub fn ask(&self, objects: &[MovingBox]) -> Result<SampledAnswers, PassError> {
+    pub fn query(&self, objects: &[MovingBox]) -> Result<SampledAnswers, PassError> {
         let mut gpu = Gpu::without_packets(self.occluders.settings.spec)?;
         let query = if self.any { Query::Any } else { Query::Count };
         let answers = gpu.query_samples(&self.occluders.without_image(), query, objects)?;
@@ -458,12 +458,13 @@ impl Gpu<'_> {
         let depth = DepthState { test: Compare::LessEqual, write: false };
         let state = DrawState { depth, ..DrawState::new(Cull::None) };
         let mut draws = pass.draws.to_vec();
-        let mut asked: Vec<Option<usize>> = Vec::new();
+        let mut queried: Vec<Option<usize>> = Vec::new();
         for [open, close] in &corners {
             // A geometry is refused only for values that are not finite, which are invisible.
             let geometry = Geometry::new(open, close, &MovingBox::TRIANGLES).ok();
-            asked.push(geometry.is_some().then_some(draws.len()));
-            let draw = |geometry| Draw::new(geometry, &Counted, Cull::None).with_state(state).asking(query);
+            queried.push(geometry.is_some().then_some(draws.len()));
+            let draw =
+                |geometry| Draw::new(geometry, &Counted, Cull::None).with_state(state).with_query(query);
             draws.extend(geometry.map(draw));
         }
         let passed = self.draw(&RasterPass { draws: &draws, ..*pass })?.passed;
@@ -474,6 +475,6 @@ impl Gpu<'_> {
             .map(|(counts, passed)| SampledAnswer::of(counts, passed))
             .collect();
         let answer = |draw: Option<usize>| draw.map_or_else(SampledAnswer::default, |draw| found[draw]);
-        Ok(asked.into_iter().map(answer).collect())
+        Ok(queried.into_iter().map(answer).collect())
     }
 }

@@ -8,7 +8,7 @@ use super::lanes::Warps;
 use super::pass::{INDEX_BYTES, Pass, Plane, Query, SAMPLE_BYTES, VertexBuffer};
 use super::resolve::{SampleLine, TileResolve, tile_lines};
 use super::shaded::{QuadWork, ShadedTriangle};
-use crate::memory::{Access, Cache, CacheError, LINE_BYTES, MemorySystem};
+use crate::memory::{AccessOutcome, Cache, CacheError, LINE_BYTES, MemorySystem};
 use crate::random::mix;
 use crate::sampling::Sample;
 use crate::setup::{PixelRect, Triangle};
@@ -249,7 +249,7 @@ impl<'a> Replay<'a> {
         let mut warps = Warps::new(self.pass.settings.spec.warp_lanes);
         for access in quads {
             counts[Event::ShadingLookups] += u32::from(access.lookups);
-            let hit = self.shading.access(quad_key(triangle, access.quad), false) == Access::Hit;
+            let hit = self.shading.access(quad_key(triangle, access.quad), false) == AccessOutcome::Hit;
             counts[Event::ShadingHits] += u32::from(access.lookups) - u32::from(!hit);
             if hit {
                 continue;

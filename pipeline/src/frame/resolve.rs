@@ -16,7 +16,7 @@ use super::shaded::{SampleView, ShadedTriangle};
 use super::{Settings, Shading};
 use crate::depth::DepthTile;
 use crate::memory::{LINE_BYTES, MemorySystem};
-use crate::random::mix;
+use crate::random::{GOLDEN, mix};
 use crate::sampling::TileSamples;
 use crate::shading::{QuadAccess, QuadSet, lane_of};
 use crate::simd::prefetch;
@@ -191,7 +191,7 @@ impl KnownColours {
     fn place(triangle: u32, quad: [i32; 2]) -> usize {
         let [x, y] = quad.map(|part| u64::from(part as u16));
         let key = u64::from(triangle) << 32 | x << 16 | y;
-        (key.wrapping_mul(0x9E37_79B9_7F4A_7C15) >> (64 - Self::BITS)) as usize
+        (key.wrapping_mul(GOLDEN) >> (64 - Self::BITS)) as usize
     }
 
     /// Prefetches what is known of a quad.

@@ -8,7 +8,7 @@ use crate::sample_test;
 use crate::setup::Triangle;
 use crate::traversal::{
     self, Box5, EdgeBounds, Edges, Facing, LensLines, LensSpan, LensSpans, Piece, SCREEN_GAIN_MADDS as GAIN,
-    Screen, TileRect, TimePieces, View, narrow_counted,
+    Screen, TileRect, TileView, TimePieces, narrow_counted,
 };
 
 /// A triangle with the results of its set-up.
@@ -355,7 +355,7 @@ impl Subject<'_> {
         let within = remaining.within;
         remaining.edges.get_or_insert_with(|| {
             work.edge_madds += traversal::edge_madds(self.triangle.moving, within.lens);
-            Edges::new(View::new(self.triangle, self.shear, rect, &within))
+            Edges::new(TileView::new(self.triangle, self.shear, rect, &within))
         })
     }
 }

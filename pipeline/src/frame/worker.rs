@@ -13,7 +13,7 @@ use super::{Ready, Settings, Shading};
 use crate::depth::{Bounder, DepthTile, Visible, interval_madds, set_up_madds};
 use crate::geometry::Shear;
 use crate::memory::depths_fit;
-use crate::sample_test::{Hits, SampleTest, Target, Width};
+use crate::sample_test::{Hits, SampleTest, StoredSamples, VectorWidth};
 use crate::sampling::TileSamples;
 use crate::setup::{Corner, PixelRect, Triangle};
 use crate::shading::QuadSet;
@@ -212,7 +212,7 @@ impl<'a, 'p> BinWorker<'a, 'p> {
             hits.covered.get_or_insert_default();
         }
         hits.clear();
-        let mut target = Target { depth: &mut stored.depth, triangle: &mut stored.triangle };
+        let mut target = StoredSamples { depth: &mut stored.depth, triangle: &mut stored.triangle };
         let (times, near) = (remaining.times, self.pass.projection.near);
         let (triangle, within) = unclipped(subject.triangle, remaining.within);
         let mut savings = ScreenSavings::default();
@@ -228,7 +228,7 @@ impl<'a, 'p> BinWorker<'a, 'p> {
                 let (triangle, screen, target) = (&triangle, screen.as_ref(), &mut target);
                 let (image, hits) = (subject.image, &mut *hits);
                 SampleTest { triangle, samples, within: &within, image, screen, near, target, hits }
-                    .run(Width::widest());
+                    .run(VectorWidth::widest());
             }
             if features.auto {
                 let counts = [hits.screened - before[0], hits.tested - before[1]];

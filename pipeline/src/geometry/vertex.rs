@@ -223,7 +223,7 @@ pub enum DrawError {
     Length {
         /// Name of the array.
         what: &'static str,
-        /// Its length.
+        /// Entries of the array.
         found: usize,
         /// Number of vertices.
         expected: usize,

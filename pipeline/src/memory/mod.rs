@@ -132,7 +132,7 @@ pub struct CacheError {
 
 /// Outcome of an access.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Access {
+pub enum AccessOutcome {
     /// The key is in the cache.
     Hit,
     /// The key is not in the cache, and no dirty key is evicted.
@@ -193,17 +193,17 @@ impl Cache {
     /// Access `key`; `write` marks it as dirty. The set is the key modulo the number of sets. `u64::MAX` is
     /// not a valid key.
     #[inline]
-    pub fn access(&mut self, key: u64, write: bool) -> Access {
+    pub fn access(&mut self, key: u64, write: bool) -> AccessOutcome {
         let newest = &mut self.set(key)[0];
         if newest.key == key {
             newest.dirty |= write;
-            return Access::Hit;
+            return AccessOutcome::Hit;
         }
         self.access_others(key, write)
     }
 
     /// [`Self::access`] of a key that is not the first of its set.
-    fn access_others(&mut self, key: u64, write: bool) -> Access {
+    fn access_others(&mut self, key: u64, write: bool) -> AccessOutcome {
         let (is_lru, last) = (self.replacement == Replacement::Lru, self.ways - 1);
         let set = self.set(key);
         if let Some(way) = set.iter().position(|line| line.key == key) {
@@ -211,7 +211,7 @@ impl Cache {
             if is_lru {
                 to_front(set, way);
             }
-            return Access::Hit;
+            return AccessOutcome::Hit;
         }
         let is_full = set[last] != Line::EMPTY;
         self.misses += 1;
@@ -224,7 +224,7 @@ impl Cache {
         let set = self.set(key);
         to_front(set, way);
         let victim = std::mem::replace(&mut set[0], Line { key, dirty: write });
-        if victim.dirty { Access::MissEvicting(victim.key) } else { Access::Miss }
+        if victim.dirty { AccessOutcome::MissEvicting(victim.key) } else { AccessOutcome::Miss }
     }
 
     /// Remove `key` without writing it back.
@@ -286,7 +286,7 @@ mod tests {
 
     fn hits(replacement: Replacement, keys: &[u64]) -> Vec<bool> {
         let mut cache = Cache::new(CacheSpec { replacement, ..CacheSpec::lru(2, 2) }).unwrap();
-        keys.iter().map(|&key| cache.access(key, false) == Access::Hit).collect()
+        keys.iter().map(|&key| cache.access(key, false) == AccessOutcome::Hit).collect()
     }
 
     #[test]
@@ -325,23 +325,23 @@ mod tests {
     #[test]
     fn the_least_recently_used_makes_room() {
         let mut c = cache(2, 2);
-        assert_eq!(c.access(10, false), Access::Miss);
-        assert_eq!(c.access(20, false), Access::Miss);
-        assert_eq!(c.access(10, false), Access::Hit);
-        assert_eq!(c.access(30, false), Access::Miss);
-        assert_eq!(c.access(10, false), Access::Hit);
-        assert_eq!(c.access(20, false), Access::Miss);
+        assert_eq!(c.access(10, false), AccessOutcome::Miss);
+        assert_eq!(c.access(20, false), AccessOutcome::Miss);
+        assert_eq!(c.access(10, false), AccessOutcome::Hit);
+        assert_eq!(c.access(30, false), AccessOutcome::Miss);
+        assert_eq!(c.access(10, false), AccessOutcome::Hit);
+        assert_eq!(c.access(20, false), AccessOutcome::Miss);
     }
 
     #[test]
     fn only_dirty_keys_are_written_back() {
         let mut c = cache(1, 1);
         c.access(1, false);
-        assert_eq!(c.access(2, true), Access::Miss);
-        assert_eq!(c.access(3, false), Access::MissEvicting(2));
+        assert_eq!(c.access(2, true), AccessOutcome::Miss);
+        assert_eq!(c.access(3, false), AccessOutcome::MissEvicting(2));
         c.access(3, true);
         assert_eq!(c.flush(), [3]);
-        assert_eq!(c.access(3, false), Access::Miss);
+        assert_eq!(c.access(3, false), AccessOutcome::Miss);
     }
 
     #[test]
@@ -350,19 +350,19 @@ mod tests {
         c.access(1, true);
         c.access(2, true);
         c.discard(1);
-        assert_eq!(c.access(3, false), Access::Miss);
-        assert_eq!(c.access(2, false), Access::Hit);
+        assert_eq!(c.access(3, false), AccessOutcome::Miss);
+        assert_eq!(c.access(2, false), AccessOutcome::Hit);
         assert_eq!(c.flush(), [2]);
     }
 
     #[test]
     fn sets_do_not_disturb_each_other() {
         let mut c = cache(4, 1);
-        (0..4).for_each(|key| assert_eq!(c.access(key, false), Access::Miss));
-        (0..4).for_each(|key| assert_eq!(c.access(key, false), Access::Hit));
-        assert_eq!(c.access(4, false), Access::Miss);
-        assert_eq!(c.access(0, false), Access::Miss);
-        assert_eq!(c.access(1, false), Access::Hit);
+        (0..4).for_each(|key| assert_eq!(c.access(key, false), AccessOutcome::Miss));
+        (0..4).for_each(|key| assert_eq!(c.access(key, false), AccessOutcome::Hit));
+        assert_eq!(c.access(4, false), AccessOutcome::Miss);
+        assert_eq!(c.access(0, false), AccessOutcome::Miss);
+        assert_eq!(c.access(1, false), AccessOutcome::Hit);
     }
 
     #[test]

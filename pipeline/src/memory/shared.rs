@@ -5,7 +5,7 @@
 
 use activity::{Event, LEVELS, LevelRequests, LineAccess, LineKind, PacketCounts, Unit};
 
-use super::{Access, Cache, CacheError, CacheSpec, LINE_BYTES};
+use super::{AccessOutcome, Cache, CacheError, CacheSpec, LINE_BYTES};
 
 /// Levels below the L2, those that there are.
 pub(super) type LevelSpecs = [Option<CacheSpec>; LEVELS.len()];
@@ -53,17 +53,17 @@ impl SharedCaches {
         counts[if write { Event::L2Writes } else { Event::L2Reads }] += 1;
         let found = self.cache.access(line, write);
         let kind = match (found, write) {
-            (Access::Hit, false) => LineKind::Hit,
-            (Access::Hit, true) => LineKind::Write,
+            (AccessOutcome::Hit, false) => LineKind::Hit,
+            (AccessOutcome::Hit, true) => LineKind::Write,
             (_, false) => LineKind::Fetch,
             (_, true) => LineKind::Allocate,
         };
         let mut access = LineAccess::new(client, line_number(line), kind);
-        counts[Event::L2Misses] += u32::from(found != Access::Hit);
+        counts[Event::L2Misses] += u32::from(found != AccessOutcome::Hit);
         if kind == LineKind::Fetch {
             request(&mut self.levels, line, false, &mut access);
         }
-        if let Access::MissEvicting(victim) = found {
+        if let AccessOutcome::MissEvicting(victim) = found {
             request(&mut self.levels, victim, true, &mut access);
         }
         note(&mut self.log, access, counts);
@@ -101,14 +101,14 @@ fn request(levels: &mut [CacheLevel], line: u64, write: bool, access: &mut LineA
     let found = level.cache.access(line, write);
     let requests = &mut access.levels[level.at];
     *if write { &mut requests.writes } else { &mut requests.reads } += 1;
-    requests.misses += u8::from(found != Access::Hit);
-    if found == Access::Hit && !write {
+    requests.misses += u8::from(found != AccessOutcome::Hit);
+    if found == AccessOutcome::Hit && !write {
         access.kind = LineKind::Below;
     }
-    if found != Access::Hit && !write {
+    if found != AccessOutcome::Hit && !write {
         request(below, line, false, access);
     }
-    if let Access::MissEvicting(victim) = found {
+    if let AccessOutcome::MissEvicting(victim) = found {
         access.levels[level.at].writebacks += 1;
         request(below, victim, true, access);
     }

@@ -5,7 +5,7 @@ use activity::{Event, LEVELS, LineAccess, PacketCounts, Unit};
 use serde::{Deserialize, Serialize};
 
 use super::shared::SharedCaches;
-use super::{Access, Cache, CacheError, CacheSpec, LINE_BYTES, MemoryRange};
+use super::{AccessOutcome, Cache, CacheError, CacheSpec, LINE_BYTES, MemoryRange};
 
 /// Caches of memory, with lines of 64 bytes as entries.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -138,7 +138,7 @@ impl MemorySystem {
     pub fn write_bin(&mut self, address: u64, counts: &mut PacketCounts) {
         let Some(bins) = &mut self.bins else { return };
         counts[Event::BinLinesWritten] += 1;
-        if let Access::MissEvicting(victim) = bins.access(address / LINE_BYTES, true) {
+        if let AccessOutcome::MissEvicting(victim) = bins.access(address / LINE_BYTES, true) {
             self.l2.access(Unit::Setup, victim, true, counts);
         }
     }
@@ -149,11 +149,11 @@ impl MemorySystem {
         counts[Event::BinLinesRead] += 1;
         let line = address / LINE_BYTES;
         let found = bins.access(line, false);
-        if found == Access::Hit {
+        if found == AccessOutcome::Hit {
             return;
         }
         counts[Event::BinMisses] += 1;
-        if let Access::MissEvicting(victim) = found {
+        if let AccessOutcome::MissEvicting(victim) = found {
             self.l2.access(Unit::Traversal, victim, true, counts);
         }
         self.l2.access(Unit::Traversal, line, false, counts);
@@ -211,11 +211,11 @@ fn access(
     let line = address / LINE_BYTES;
     counts[client.lines] += 1;
     let found = client.cache.access(line, write);
-    if found == Access::Hit {
+    if found == AccessOutcome::Hit {
         return;
     }
     counts[client.misses] += 1;
-    if let Access::MissEvicting(victim) = found {
+    if let AccessOutcome::MissEvicting(victim) = found {
         l2.access(client.unit, compressed.moved_line(victim), true, counts);
     }
     if !fresh {

@@ -8,11 +8,11 @@ use std::ops::Range;
 use super::{Crossing, SampleRows, View, block_of, hit, vertices_seen};
 use crate::sampling::TileSamples;
 use crate::setup::Triangle;
-use crate::simd::{Kernel, LANES, Lanes, Mask, Width, dispatch};
+use crate::simd::{Kernel, LANES, Lanes, Mask, VectorWidth, dispatch};
 use crate::traversal::{Box5, Screen};
 
 /// Stored samples of a tile, in the order of its [`TileSamples`].
-pub struct Target<'a> {
+pub struct StoredSamples<'a> {
     /// Depth of the nearest hit so far, infinite without a hit.
     pub depth: &'a mut [f32],
     /// Triangle of the nearest hit so far; undefined without a hit.
@@ -94,11 +94,11 @@ pub fn test_run(
     samples: &TileSamples,
     within: &Box5,
     near: f32,
-    target: &mut Target<'_>,
+    target: &mut StoredSamples<'_>,
     hits: &mut Hits,
 ) {
     SampleTest { triangle, samples, within, image: None, screen: None, near, target, hits }
-        .run(Width::widest());
+        .run(VectorWidth::widest());
 }
 
 /// A triangle to be tested against the samples of a tile, and the memory of the result.
@@ -116,14 +116,14 @@ pub struct SampleTest<'a, 'b> {
     /// Near depth.
     pub near: f32,
     /// Stored samples, updated with those that see the triangle.
-    pub target: &'a mut Target<'b>,
+    pub target: &'a mut StoredSamples<'b>,
     /// Counts and written samples.
     pub hits: &'a mut Hits,
 }
 
 impl SampleTest<'_, '_> {
     /// Run the test with vectors of a given width; all widths give the same bytes.
-    pub fn run(self, width: Width) {
+    pub fn run(self, width: VectorWidth) {
         if self.samples.parallel { start_in::<true>(width, self) } else { start_in::<false>(width, self) }
     }
 }
@@ -131,7 +131,7 @@ impl SampleTest<'_, '_> {
 /// A run of the kernel in the dimensions it needs.
 struct Run<'a, 'b, const MOTION: bool, const LENS: bool, const PARALLEL: bool>(SampleTest<'a, 'b>);
 
-fn start_in<const PARALLEL: bool>(width: Width, job: SampleTest<'_, '_>) {
+fn start_in<const PARALLEL: bool>(width: VectorWidth, job: SampleTest<'_, '_>) {
     match (job.triangle.moving, job.within.lens) {
         (false, false) => dispatch(width, Run::<false, false, PARALLEL>(job)),
         (true, false) => dispatch(width, Run::<true, false, PARALLEL>(job)),
@@ -514,7 +514,7 @@ mod tests {
             margin: [0.0; 3],
             extent: [1.0; 3],
         };
-        let mut target = Target { depth: &mut [], triangle: &mut [] };
+        let mut target = StoredSamples { depth: &mut [], triangle: &mut [] };
         let (within, near, hits) = (&within, 0.1, &mut Hits::default());
         let job = SampleTest {
             triangle: &triangle,

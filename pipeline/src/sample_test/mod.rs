@@ -28,9 +28,9 @@ mod kernel;
 use crate::sampling::TileSamples;
 use crate::setup::Corner;
 use crate::shader::Lane;
-pub use crate::simd::Width;
+pub use crate::simd::VectorWidth;
 use crate::simd::{LANES, Lanes, Mask};
-pub use kernel::{Covered, Hits, PixelHits, SampleTest, Target, madds, test_run};
+pub use kernel::{Covered, Hits, PixelHits, SampleTest, StoredSamples, madds, test_run};
 
 /// Data of sixteen samples for the sample test, in memory.
 #[derive(Clone, Copy)]
@@ -185,10 +185,10 @@ impl<V: Lanes> Crossing<V> {
 const EDGES: [[usize; 2]; 3] = [[1, 2], [2, 0], [0, 1]];
 
 /// A vertex relative to a sample: `[x', y', w]`.
-pub type Seen = [f32; 3];
+pub type SeenVertex = [f32; 3];
 
 /// Vertices of a triangle as seen by one of sixteen samples.
-pub(crate) fn vertices_seen(corners: &[Corner; 3], rows: &SampleRows<'_>, lane: usize) -> [Seen; 3] {
+pub(crate) fn vertices_seen(corners: &[Corner; 3], rows: &SampleRows<'_>, lane: usize) -> [SeenVertex; 3] {
     let [slope, lens] =
         [&rows.slope, &rows.lens].map(|axes: &[&[f32; LANES]; 2]| [axes[0][lane], axes[1][lane]]);
     corners.map(|corner| see(&corner, slope, lens, rows.t[lane]))
@@ -202,14 +202,14 @@ pub(crate) fn covers(corners: &[Corner; 3], [across, down]: [[f32; 2]; 2], t: f3
 }
 
 /// One vertex, with the operations of the kernel in their order.
-fn see(corner: &Corner, slope: [f32; 2], lens: [f32; 2], t: f32) -> Seen {
+fn see(corner: &Corner, slope: [f32; 2], lens: [f32; 2], t: f32) -> SeenVertex {
     let [x, y, w] = corner.at(t);
     [(-slope[0]).mul_add(w, x - lens[0]), (-slope[1]).mul_add(w, y - lens[1]), w]
 }
 
 /// Depth at which a sample hits a triangle with the given drawn faces, and whether the triangle is counter-clockwise
 /// there.
-pub(crate) fn hit(seen: &[Seen; 3], faces: [bool; 2]) -> Option<(f32, bool)> {
+pub(crate) fn hit(seen: &[SeenVertex; 3], faces: [bool; 2]) -> Option<(f32, bool)> {
     let (weights, counter_clockwise) = weights(seen)?;
     faces[usize::from(counter_clockwise)].then(|| (depth(seen, &weights), counter_clockwise))
 }
@@ -224,7 +224,7 @@ pub(crate) fn hit(seen: &[Seen; 3], faces: [bool; 2]) -> Option<(f32, bool)> {
 /// In an orthographic view the same terms tilt the ray about its point at depth 0, by `(eps, eps^2)` per unit
 /// of depth. Any tilted ray makes neighbours agree. At positive depth, where alone samples count, edges and
 /// vertices have the same owner as if the sample were moved.
-pub fn weights(seen: &[Seen; 3]) -> Option<([f64; 3], bool)> {
+pub fn weights(seen: &[SeenVertex; 3]) -> Option<([f64; 3], bool)> {
     let edges = EDGES.map(|[i, j]| terms(&seen[i], &seen[j]));
     let signs = edges.map(|levels| levels.into_iter().map(sign).find(|&s| s != 0).unwrap_or(0));
     if signs[0] == 0 || signs[1] != signs[0] || signs[2] != signs[0] {
@@ -239,7 +239,7 @@ pub fn weights(seen: &[Seen; 3]) -> Option<([f64; 3], bool)> {
 }
 
 /// The weights of [`weights`], computed on a lane, which goes on to `B` and `C` for edges through the origin only.
-pub fn weights_on(lane: &Lane, seen: &[Seen; 3]) -> Option<[f64; 3]> {
+pub fn weights_on(lane: &Lane, seen: &[SeenVertex; 3]) -> Option<[f64; 3]> {
     let level = |[i, j]: [usize; 2], level| term_on(lane, &seen[i], &seen[j], level);
     let is_zero = |edge: f64| lane.branch(edge == 0.0);
     let mut parts = EDGES.map(|edge| level(edge, 0));
@@ -265,14 +265,14 @@ pub fn weights_on(lane: &Lane, seen: &[Seen; 3]) -> Option<[f64; 3]> {
 }
 
 /// `e`, `B` or `C` of the edge from `i` to `j`, whose products are exact.
-fn term_on(lane: &Lane, i: &Seen, j: &Seen, level: usize) -> f64 {
+fn term_on(lane: &Lane, i: &SeenVertex, j: &SeenVertex, level: usize) -> f64 {
     let (first, second) = [(0, 1), (1, 2), (2, 0)][level];
     let [i, j] = [i, j].map(|seen| [seen[first], seen[second]].map(f64::from));
     lane.madd(-j[0], i[1], lane.mul(i[0], j[1]))
 }
 
 /// Pairs of exact products whose differences are `e`, `B` and `C` of the edge from `i` to `j`.
-fn terms(i: &Seen, j: &Seen) -> [(f64, f64); 3] {
+fn terms(i: &SeenVertex, j: &SeenVertex) -> [(f64, f64); 3] {
     let [xi, yi, wi] = i.map(f64::from);
     let [xj, yj, wj] = j.map(f64::from);
     [(xi * yj, xj * yi), (yi * wj, yj * wi), (wi * xj, wj * xi)]
@@ -283,7 +283,7 @@ fn sign((plus, minus): (f64, f64)) -> i8 {
 }
 
 /// Depth of a hit with the given weights, clamped to the range of the vertices.
-pub fn depth(seen: &[Seen; 3], weights: &[f64; 3]) -> f32 {
+pub fn depth(seen: &[SeenVertex; 3], weights: &[f64; 3]) -> f32 {
     let w = seen.map(|vertex| vertex[2]);
     let mean: f64 = weights.iter().zip(w).map(|(weight, w)| weight * f64::from(w)).sum();
     (mean as f32).clamp(w[0].min(w[1]).min(w[2]), w[0].max(w[1]).max(w[2]))
@@ -299,7 +299,7 @@ mod tests {
         let [mut inside, mut on_edge] = [0, 0];
         for number in 0..20_000 {
             let word = |k: u64| crate::random::mix(9 * number + k);
-            let seen: [Seen; 3] = std::array::from_fn(|vertex| {
+            let seen: [SeenVertex; 3] = std::array::from_fn(|vertex| {
                 let [x, y, w] = [0, 1, 2].map(|axis| word(3 * vertex as u64 + axis) >> 8);
                 [(x % 5) as f32 - 2.0, (y % 5) as f32 - 2.0, (w % 4) as f32]
             });
@@ -318,7 +318,7 @@ mod tests {
 
     #[test]
     fn weights_cost_what_they_compute() {
-        let ops = |seen: &[Seen; 3]| {
+        let ops = |seen: &[SeenVertex; 3]| {
             let lane = Lane::default();
             let found = weights_on(&lane, seen).is_some();
             (lane.ops(), found)
@@ -349,7 +349,7 @@ mod tests {
     #[test]
     fn a_shared_vertex_has_one_owner() {
         // A fan of eight triangles around a vertex at the sample itself.
-        let rim: Vec<Seen> = [(3, 0), (2, 2), (0, 3), (-2, 2), (-3, 0), (-2, -2), (0, -3), (2, -2)]
+        let rim: Vec<SeenVertex> = [(3, 0), (2, 2), (0, 3), (-2, 2), (-3, 0), (-2, -2), (0, -3), (2, -2)]
             .map(|(x, y)| [x as f32, y as f32, 1.0 + 0.1 * x as f32])
             .to_vec();
         let centre = [0.0, 0.0, 1.0];

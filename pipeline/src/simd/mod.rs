@@ -60,7 +60,7 @@ pub(crate) trait Lanes:
 
 /// A vector width that this machine supports.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Width(Vectors);
+pub struct VectorWidth(Vectors);
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Vectors {
@@ -71,9 +71,10 @@ enum Vectors {
     Avx512,
 }
 
-static WIDEST: LazyLock<Width> = LazyLock::new(|| Width::available().last().unwrap_or(Width(Vectors::Plain)));
+static WIDEST: LazyLock<VectorWidth> =
+    LazyLock::new(|| VectorWidth::available().last().unwrap_or(VectorWidth(Vectors::Plain)));
 
-impl Width {
+impl VectorWidth {
     /// All widths of this machine, the widest last.
     pub fn available() -> impl Iterator<Item = Self> {
         let mut widths = vec![Self(Vectors::Plain)];
@@ -116,7 +117,7 @@ pub(crate) fn prefetch<T>(at: &T) {
 }
 
 /// Run a kernel with vectors of the given width.
-pub(crate) fn dispatch(width: Width, kernel: impl Kernel) {
+pub(crate) fn dispatch(width: VectorWidth, kernel: impl Kernel) {
     match width.0 {
         Vectors::Plain => kernel.run::<Plain>(),
         // SAFETY: a `Width` other than the plain one exists only on machines that support it.
@@ -325,8 +326,8 @@ mod tests {
             dispatch(width, Everything(&mut bits));
             bits
         };
-        let plain = at(Width(Vectors::Plain));
+        let plain = at(VectorWidth(Vectors::Plain));
         assert!(plain.len() > 200 * 160);
-        assert!(Width::available().all(|width| at(width) == plain));
+        assert!(VectorWidth::available().all(|width| at(width) == plain));
     }
 }

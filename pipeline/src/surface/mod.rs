@@ -1,6 +1,6 @@
 //! Surfaces: named images of a frame that passes write and later ones read, in a [`Format`], with one or more
 //! samples per pixel. What is read is what the format kept. A shader reads textures, surfaces and buffers
-//! through [`Bound`].
+//! through [`BoundSlot`].
 
 mod format;
 
@@ -227,7 +227,7 @@ impl Layout {
 
 /// What a shader reads in one of its slots.
 #[derive(Clone, Debug)]
-pub struct Bound<'a>(Source<'a>);
+pub struct BoundSlot<'a>(Source<'a>);
 
 #[derive(Clone, Debug)]
 enum Source<'a> {
@@ -237,7 +237,7 @@ enum Source<'a> {
     Buffer(BoundBuffer),
 }
 
-impl<'a> Bound<'a> {
+impl<'a> BoundSlot<'a> {
     /// A texture in memory.
     pub(crate) fn texture(sampler: Sampler<'a>) -> Self {
         Self(Source::Texture(sampler))
@@ -359,11 +359,11 @@ mod tests {
         assert_eq!((words.len(), words[2 * (4 + 2) + 1]), (16, 7.0_f32.to_bits()));
     }
 
-    fn ramp(format: Format) -> Bound<'static> {
+    fn ramp(format: Format) -> BoundSlot<'static> {
         let spec = SurfaceSpec::new("ramp", Viewport::new(16, 4).unwrap(), format);
         let mut texels = Texels::filled(&spec, Vec4::ZERO);
         (0..64).for_each(|index| texels.set(index, Vec4::splat((index % 16) as f32)));
-        Bound::surface(vec![(Arc::new(texels), Layout::new(&spec, 8, 1024).0)])
+        BoundSlot::surface(vec![(Arc::new(texels), Layout::new(&spec, 8, 1024).0)])
     }
 
     fn lines(read: impl FnOnce(&mut dyn FnMut(u64)) -> Vec4) -> (f32, Vec<u64>) {

@@ -1,7 +1,7 @@
 //! Edges of a triangle over a box as quadratics of time, and the times at which a sample may be inside all of
 //! them.
 //!
-//! Seen from the middle of a box (see [`View`]) the edge `e = P_i x P_j` is, exactly,
+//! Seen from the middle of a box (see [`TileView`]) the edge `e = P_i x P_j` is, exactly,
 //!
 //! ```text
 //! e(d) = e + dX (-A) + dY (-B) + du (a A + s (y_i - y_j)) + dv (b B + s' (x_j - x_i))
@@ -22,12 +22,12 @@
 
 use super::number::{Coordinate, Number, Quadratic};
 use super::region::{Faces, Piece, Point, TimePieces};
-use super::{PHASE, ROOT, View};
+use super::{PHASE, ROOT, TileView};
 
 /// Edges of a triangle over a box; edge `k` is opposite vertex `k`.
 #[derive(Clone, Copy, Debug)]
 pub struct Edges<N = f64, C = f32> {
-    pub(super) view: View<N, C>,
+    pub(super) view: TileView<N, C>,
     pub(super) edges: [Edge<N>; 3],
 }
 
@@ -45,7 +45,7 @@ pub(super) struct Edge<N> {
 impl<N: Number, C: Coordinate> Edges<N, C> {
     /// Edges of the triangle in `view`.
     #[inline(always)]
-    pub fn new(view: View<N, C>) -> Self {
+    pub fn new(view: TileView<N, C>) -> Self {
         let edge = |i: usize, j: usize| Edge::new(&view, i, j);
         let edges = [edge(1, 2), edge(2, 0), edge(0, 1)];
         Self { view, edges }
@@ -58,7 +58,7 @@ impl<N: Number, C: Coordinate> Edges<N, C> {
 
     /// Factor of the difference of depths in the nonlinear term over lens and tile.
     pub(super) fn skew(&self) -> N {
-        let View { half, s, a, lens, parallel, .. } = &self.view;
+        let TileView { half, s, a, lens, parallel, .. } = &self.view;
         if !lens {
             return N::zero();
         }
@@ -70,7 +70,7 @@ impl<N: Number, C: Coordinate> Edges<N, C> {
 
 impl<N: Number> Edge<N> {
     #[inline(always)]
-    fn new<C: Coordinate>(view: &View<N, C>, i: usize, j: usize) -> Self {
+    fn new<C: Coordinate>(view: &TileView<N, C>, i: usize, j: usize) -> Self {
         let [open, close] = view.ends.map(|points| [points[i], points[j]]);
         let difference = |axis: usize| [open, close].map(|[p, q]| q[axis] - p[axis]);
         let over_time = |[start, end]: [N; 2]| {
@@ -115,7 +115,7 @@ impl<N: Number> Edge<N> {
 
     /// Lower and upper bound in the arithmetic of the sample test, as quadratics of time.
     #[inline]
-    pub(super) fn range<C: Coordinate>(&self, view: &View<N, C>, skew: N) -> [Quadratic<N>; 2] {
+    pub(super) fn range<C: Coordinate>(&self, view: &TileView<N, C>, skew: N) -> [Quadratic<N>; 2] {
         let [from, to] = self.depths.map(N::abs);
         let bend = [from, from.max(to), to];
         let axes = if view.lens { 4 } else { 2 };
@@ -262,11 +262,11 @@ impl<N: Number> EdgeBounds<N> {
 #[cfg(test)]
 mod tests {
     use super::super::testing::{Case, Uniform, cases};
-    use super::super::{EdgeBounds, View};
+    use super::super::{EdgeBounds, TileView};
     use super::*;
 
     fn edges(case: &Case) -> Edges {
-        Edges::new(View::new(&case.triangle, &case.shear, &case.tile, &case.within))
+        Edges::new(TileView::new(&case.triangle, &case.shear, &case.tile, &case.within))
     }
 
     fn at(q: &Quadratic, phase: f64) -> f64 {
@@ -344,7 +344,8 @@ mod tests {
     fn no_time_in_which_a_place_is_inside_is_lost() {
         let (mut r, mut culled, mut shrunk) = (Uniform::new(4), 0, 0);
         for (seed, case) in cases(400) {
-            let edges = Edges::<f64>::new(View::new(&case.triangle, &case.shear, &case.tile, &case.within));
+            let edges =
+                Edges::<f64>::new(TileView::new(&case.triangle, &case.shear, &case.tile, &case.within));
             let whole = TimePieces::one(Piece { t: case.within.t, faces: [true; 2] });
             for drawn in [[true, true], [true, false], [false, true]] {
                 let (left, _) = EdgeBounds::new(&edges).timeline(&edges, &whole, drawn);

@@ -31,7 +31,7 @@ use crate::geometry::{MovingVertex, Shear};
 pub use edges::{EdgeBounds, Edges};
 pub use lens::{LensLines, LensSpan, LensSpans};
 pub use number::{Coordinate, Number, Pieces, Quadratic, Scalar};
-pub use region::{Box5, Faces, Piece, TileRect, TimePieces, View};
+pub use region::{Box5, Faces, Piece, TileRect, TileView, TimePieces};
 pub use screen::{Facing, SCREEN_GAIN_MADDS, Screen, screen_madds};
 pub use side_planes::{narrow, narrow_by_sides, narrow_counted, narrow_near};
 pub use time_interval::{TimeIntervals, time_interval, time_interval_counted};
@@ -160,22 +160,21 @@ pub const fn screen_setup_madds(moving: bool, lens: bool, whole: bool) -> u32 {
 mod testing {
     use super::{Box5, TileRect};
     use crate::geometry::{Cull, MovingVertex, Shear};
-    use crate::random::mix;
+    use crate::random::{GOLDEN, SplitMix, mix};
     use crate::setup::{SetupResult, Triangle, set_up};
 
     pub const NEAR: f32 = 0.25;
 
-    /// Counter-based uniform numbers.
-    pub struct Uniform(u64);
+    /// Uniform numbers.
+    pub struct Uniform(SplitMix);
 
     impl Uniform {
         pub fn new(seed: u64) -> Self {
-            Self(mix(seed.wrapping_add(0x9E37_79B9_7F4A_7C15)))
+            Self(SplitMix::new(mix(seed.wrapping_add(GOLDEN))))
         }
 
         pub fn within(&mut self, lo: f32, hi: f32) -> f32 {
-            self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-            lo + (hi - lo) * ((mix(self.0) >> 40) as f32 / 16_777_216.0)
+            lo + (hi - lo) * ((self.0.next_word() >> 40) as f32 / 16_777_216.0)
         }
 
         /// A number of a range, often an end of it.
@@ -397,7 +396,7 @@ mod tests {
             let tile = TileRect { x: [0.0, 8.0], y: [16.0, 24.0] };
             let within = Box5 { t: [0.25, 0.75], ..Box5::whole(lens) };
             let (madds, edges) =
-                count(|| Edges::<Counted>::new(View::new(&triangle, &shear, &tile, &within)));
+                count(|| Edges::<Counted>::new(TileView::new(&triangle, &shear, &tile, &within)));
             println!("edges {moving} {lens} {madds}");
             assert_eq!(madds, edge_madds(moving, lens), "edges {moving} {lens}");
             let (madds, facing) = count(|| Facing::new(&edges));
@@ -432,7 +431,7 @@ mod tests {
             let tile = TileRect { x: [0.0, 8.0], y: [16.0, 24.0] };
             let within = Box5 { t: [0.25, 0.75], ..Box5::whole(lens) };
             let (found, edges) =
-                count(|| Edges::<Counted>::new(View::new(&triangle, &shear, &tile, &within)));
+                count(|| Edges::<Counted>::new(TileView::new(&triangle, &shear, &tile, &within)));
             let (facing, _) = count(|| Facing::new(&edges));
             let (bounds, _) = count(|| EdgeBounds::new(&edges));
             let (screen, _) = count(|| Screen::new(&edges, within.t, [true; 2]));

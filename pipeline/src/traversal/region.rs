@@ -190,7 +190,7 @@ pub(super) type Point<N> = [N; 3];
 /// (x', y') + (alpha w - s du - dX, beta w - s' dv - dY)
 /// ```
 #[derive(Clone, Copy, Debug)]
-pub struct View<N = f64, C = f32> {
+pub struct TileView<N = f64, C = f32> {
     /// Vertices at both ends of the time interval; equal for a still triangle.
     pub(super) ends: [[Point<N>; 3]; 2],
     /// Middle in X, Y, u, v.
@@ -209,12 +209,12 @@ pub struct View<N = f64, C = f32> {
     pub(super) reach: [N; 2],
     /// Error bound of an edge of the sample test.
     pub(super) rounding: N,
-    /// Largest weight of a vertex in the box ([`View::weight`]), and the largest depth that scales rounding
+    /// Largest weight of a vertex in the box ([`TileView::weight`]), and the largest depth that scales rounding
     /// errors.
     pub(super) depth: [N; 2],
 }
 
-impl<N: Number, C: Coordinate> View<N, C> {
+impl<N: Number, C: Coordinate> TileView<N, C> {
     /// `triangle` seen from the middle of `tile` and `within`.
     #[inline(always)]
     pub fn new(triangle: &Triangle<C>, shear: &Shear<C>, tile: &TileRect<C>, within: &Box5<C>) -> Self {

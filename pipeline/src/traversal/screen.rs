@@ -22,7 +22,7 @@
 
 use super::edges::{Edge, Edges};
 use super::number::{Number, Quadratic, Scalar};
-use super::region::{Faces, Piece, TimePieces, View};
+use super::region::{Faces, Piece, TileView, TimePieces};
 
 /// Linear edges in the arithmetic of the sample test. A sample is outside if one edge is below `-margin` and
 /// another above `margin`.
@@ -147,7 +147,7 @@ fn one_sided<N: Number>(linear: &Linear<N>, [off, reach]: [f64; 2], faces: Faces
 
 impl<N: Number> Edge<N> {
     /// The edge linearized over `part` of the time, or over all of it; `half_t` is half the length.
-    fn linear(&self, view: &View<N>, part: Option<[N; 2]>, half_t: N, skew: N) -> Linear<N> {
+    fn linear(&self, view: &TileView<N>, part: Option<[N; 2]>, half_t: N, skew: N) -> Linear<N> {
         let over = |q: &Quadratic<N>| match part {
             Some(part) => q.over(part),
             None => *q,
@@ -332,7 +332,7 @@ fn margin<N: Number>(edges: &Edges<N>) -> N {
 mod tests {
     use super::super::number::counted::{Counted, count};
     use super::super::testing::{Uniform, cases};
-    use super::super::{Edges, Screen, View};
+    use super::super::{Edges, Screen, TileView};
     use super::*;
 
     #[test]
@@ -348,7 +348,8 @@ mod tests {
     fn edges_stay_within_the_margin_and_one_sided_screens_say_the_same() {
         let (mut r, mut outside) = (Uniform::new(5), [0; 3]);
         for (seed, case) in cases(300) {
-            let edges = Edges::<f64>::new(View::new(&case.triangle, &case.shear, &case.tile, &case.within));
+            let edges =
+                Edges::<f64>::new(TileView::new(&case.triangle, &case.shear, &case.tile, &case.within));
             let [start, end] = case.within.t;
             let part = if seed % 2 == 0 {
                 [start, end]
@@ -404,7 +405,8 @@ mod tests {
     fn the_face_is_the_sign_of_the_determinant_all_over_the_box() {
         let (mut r, mut decided, mut pieces) = (Uniform::new(6), 0, 0);
         for (seed, case) in cases(400) {
-            let edges = Edges::<f64>::new(View::new(&case.triangle, &case.shear, &case.tile, &case.within));
+            let edges =
+                Edges::<f64>::new(TileView::new(&case.triangle, &case.shear, &case.tile, &case.within));
             let facing = Facing::new(&edges);
             for (drawn, splits) in
                 [([true, true], 3), ([true, false], 2), ([false, true], 1), ([true, true], 0)]
@@ -446,7 +448,7 @@ mod tests {
             panic!("the triangle is visible");
         };
         let tile = TileRect { x: [0.0, 8.0], y: [0.0, 8.0] };
-        let edges = Edges::<f64>::new(View::new(&triangle, &shear, &tile, &Box5::whole(false)));
+        let edges = Edges::<f64>::new(TileView::new(&triangle, &shear, &tile, &Box5::whole(false)));
         let facing = Facing::new(&edges);
         assert_eq!(facing.timeline([0.0, 1.0], [true; 2], 0).0.pieces().len(), 1);
         // Around the time without area neither half is decided; the outer quarters are.
@@ -480,7 +482,7 @@ mod tests {
                 panic!("the triangle is visible");
             };
             let tile = TileRect { x: [0.0, 8.0], y: [0.0, 8.0] };
-            let edges = Edges::<f64>::new(View::new(&triangle, &shear, &tile, &Box5::whole(false)));
+            let edges = Edges::<f64>::new(TileView::new(&triangle, &shear, &tile, &Box5::whole(false)));
             assert_eq!(Facing::new(&edges).faces(), [true; 2]);
         }
     }

@@ -27,9 +27,9 @@ use crate::depth::vertex_range;
 use crate::geometry::{Camera, Clip, Cull, Geometry, MovingVertex, Projection, Shear, Viewport};
 use crate::sampling::{Sample, SampleSource, SampleTable};
 use crate::setup::{PixelRect, SetupResult, Triangle, bounds, distribute, set_up};
-use crate::simd::{Kernel, LANES, Lanes, Row, Width, dispatch};
+use crate::simd::{Kernel, LANES, Lanes, Row, VectorWidth, dispatch};
 use cells::Facing;
-pub use raster::Tally;
+pub use raster::StepTally;
 use raster::{BinSurface, Queue, VisibleBinWorker};
 pub use sorter::SampleLayout;
 use sorter::{BinSamples, CellBoxes, Hierarchy, Sorter};
@@ -72,18 +72,23 @@ impl Visibility {
 /// # Panics
 /// If the geometry has clip planes. The layout already excludes samples outside the camera's clip planes, so
 /// clip planes belong to the camera.
-pub fn resolve(layout: &SampleLayout, geometry: &Geometry<'_>, cull: Cull, into: &mut Visibility) -> Tally {
-    resolve_at(Width::widest(), layout, geometry, cull, into)
-}
-
-/// [`resolve`] with vectors of a given width, to check that all widths give the same bytes.
-pub fn resolve_at(
-    width: Width,
+pub fn resolve(
     layout: &SampleLayout,
     geometry: &Geometry<'_>,
     cull: Cull,
     into: &mut Visibility,
-) -> Tally {
+) -> StepTally {
+    resolve_at(VectorWidth::widest(), layout, geometry, cull, into)
+}
+
+/// [`resolve`] with vectors of a given width, to check that all widths give the same bytes.
+pub fn resolve_at(
+    width: VectorWidth,
+    layout: &SampleLayout,
+    geometry: &Geometry<'_>,
+    cull: Cull,
+    into: &mut Visibility,
+) -> StepTally {
     assert_eq!(geometry.clip(), Clip::NONE, "clip planes have to be those of the camera");
     let vertices = layout.projection.images(geometry);
     let corners =
@@ -133,7 +138,7 @@ pub(crate) fn bin_by_bin<'a, S, T: Send>(
             sorter.fill(samples, origin);
         }
         let surface = surface.get_or_insert_with(|| BinSurface::new(samples));
-        ready.bin(Width::widest(), &layout, (samples, list), surface);
+        ready.bin(VectorWidth::widest(), &layout, (samples, list), surface);
         seen.fill(&layout, samples, surface);
         take(own, seen)
     };
@@ -203,12 +208,12 @@ impl FrontEnd {
     /// Finds what the samples of a bin see of the triangles that are listed for it.
     fn bin(
         &self,
-        width: Width,
+        width: VectorWidth,
         layout: &SampleLayout,
         (samples, list): (&BinSamples, &[u32]),
         surface: &mut BinSurface,
-    ) -> Tally {
-        let mut tally = Tally::default();
+    ) -> StepTally {
+        let mut tally = StepTally::default();
         let queue = Queue::new(samples.sample_indices.len());
         let placed = &self.placed;
         dispatch(
@@ -336,7 +341,7 @@ impl SortedTiles {
                 return false;
             };
             let (packets, filled) = (&self.tiles[number].packets[..], &mut filled[..]);
-            dispatch(Width::widest(), Placement { sorter, bin, packets, filled, tile: [x, y] });
+            dispatch(VectorWidth::widest(), Placement { sorter, bin, packets, filled, tile: [x, y] });
         }
         bin.finish_partial();
         true

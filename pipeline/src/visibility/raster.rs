@@ -43,7 +43,7 @@ pub(super) struct BinSurface {
 
 /// Number of executions of each step.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Tally {
+pub struct StepTally {
     /// Triangles set up in a bin.
     pub bins: u64,
     /// Cells of a bin in which a triangle may be visible.
@@ -56,7 +56,7 @@ pub struct Tally {
     pub hits: u64,
 }
 
-impl std::iter::Sum for Tally {
+impl std::iter::Sum for StepTally {
     fn sum<I: Iterator<Item = Self>>(tallies: I) -> Self {
         tallies.fold(Self::default(), |a, b| Self {
             bins: a.bins + b.bins,
@@ -102,7 +102,7 @@ pub(super) struct VisibleBinWorker<'a> {
     pub surface: &'a mut BinSurface,
     pub placed: &'a [Option<BinTriangle>],
     pub list: &'a [u32],
-    pub tally: &'a mut Tally,
+    pub tally: &'a mut StepTally,
     pub queue: Queue,
 }
 

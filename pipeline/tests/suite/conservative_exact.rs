@@ -5,18 +5,17 @@
 use std::collections::HashMap;
 
 use pipeline::conservative::{Grid, MovingTriangle, Rasterizer, Touch, View};
-use pipeline::random::mix;
+use pipeline::random::SplitMix;
 
 /// Coordinates are multiples of 1 / 256, times of 1 / 16, lens positions of 1 / 8, tiles and `a` of 1 / 4.
 const UNIT: i128 = 256;
 const TIMES: i128 = 16;
 
-struct Integers(u64);
+struct Integers(SplitMix);
 
 impl Integers {
     fn within(&mut self, lo: i128, hi: i128) -> i128 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        lo + i128::from(mix(self.0) >> 1) % (hi - lo + 1)
+        lo + i128::from(self.0.next_word() >> 1) % (hi - lo + 1)
     }
 }
 
@@ -36,7 +35,7 @@ const TILES: i128 = 12;
 
 impl Case {
     fn new(seed: u64) -> Self {
-        let mut r = Integers(seed);
+        let mut r = Integers(SplitMix::new(seed));
         let [perspective, lens, moving, far, thin] = [0; 5].map(|_| r.within(0, 1) == 1);
         let [s, a] = if lens { [0; 2].map(|_| [0; 2].map(|_| r.within(-8, 8))) } else { [[0; 2]; 2] };
         let s = s.map(|s| s * 16);
@@ -142,7 +141,7 @@ fn every_touch_that_integers_show_is_reported() {
         rasterizer.rasterize(&case.triangle(), &case.grid(), |tile, touch| {
             reported.insert(tile, *touch);
         });
-        let mut r = Integers(seed + 77);
+        let mut r = Integers(SplitMix::new(seed + 77));
         let mut touched = std::collections::HashSet::new();
         for t in 0..=TIMES {
             let lens = [0; 2].map(|_| r.within(-8, 8));

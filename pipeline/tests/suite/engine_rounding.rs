@@ -5,7 +5,7 @@
 use crate::common::*;
 use glam::Vec3;
 use pipeline::geometry::Projection;
-use pipeline::sample_test::{Hits, Target, test_run};
+use pipeline::sample_test::{Hits, StoredSamples, test_run};
 use pipeline::sampling::{Sample, SampleSource, TileSamples};
 use pipeline::setup::{SetupResult, Triangle, set_up};
 use pipeline::traversal::Box5;
@@ -156,7 +156,7 @@ impl Scene {
             samples.fill(&self.samples, *viewport, shear, origin, 8);
             let (mut depth, mut triangle) = (vec![f32::INFINITY; samples.len], vec![u32::MAX; samples.len]);
             for ready in &triangles {
-                let mut target = Target { depth: &mut depth, triangle: &mut triangle };
+                let mut target = StoredSamples { depth: &mut depth, triangle: &mut triangle };
                 test_run(ready, &samples, &Box5::whole(case.lens), NEAR, &mut target, &mut Hits::default());
             }
             for slot in 0..samples.len {

@@ -11,14 +11,14 @@ use crate::common::stage::*;
 use crate::common::*;
 
 /// What a pass of queries over the stored depths of an earlier pass gives.
-struct Asked {
+struct Queried {
     passed: Vec<u64>,
     draws: Vec<Counts>,
     packets: Vec<(Packet, Vec<LineAccess>)>,
 }
 
 /// Draws `occluders` onto a surface, and then `queries` against it.
-fn ask(stage: &Stage, occluders: &[Draw<'_>], queries: &[Draw<'_>]) -> Asked {
+fn query(stage: &Stage, occluders: &[Draw<'_>], queries: &[Draw<'_>]) -> Queried {
     let (spec, mut packets) = (spec(Features::ALL), Vec::new());
     let settings =
         Settings { spec: &spec, viewport: stage.viewport, samples: &stage.table, background: Vec3::ZERO };
@@ -34,7 +34,7 @@ fn ask(stage: &Stage, occluders: &[Draw<'_>], queries: &[Draw<'_>]) -> Asked {
     let passed = gpu.draw(&pass).unwrap().passed;
     assert_eq!(gpu.contents(depth), before, "a query stores nothing");
     let draws = gpu.finish().passes.remove(1).draws;
-    Asked { passed, draws, packets }
+    Queried { passed, draws, packets }
 }
 
 /// Still or moving rectangles at random.
@@ -70,21 +70,21 @@ proptest! {
     #[test]
     fn queries_agree_with_all_samples(seed in any::<u64>(), per_pixel in prop_oneof![Just(1_u32), Just(4), Just(8)]) {
         let (stage, mut r) = (Stage::sampled(45, 35, per_pixel), Uniform::new(seed));
-        let (walls, asked) = (rectangles(&mut r, 6), rectangles(&mut r, 6));
+        let (walls, queried) = (rectangles(&mut r, 6), rectangles(&mut r, 6));
         let walls: Vec<Draw<'_>> = walls.iter().map(|[open, close]| quad(open, close, &RED)).collect();
         let test = Compare::ALL[(8.0 * r.next()) as usize];
         let state = DrawState { depth: DepthState { test, write: false }, ..DrawState::default() };
         let boxes: Vec<Draw<'_>> =
-            asked.iter().map(|[open, close]| quad(open, close, &BLUE).with_state(state)).collect();
-        let queries = |query| boxes.iter().map(|draw| draw.asking(query)).collect::<Vec<_>>();
-        let count = ask(&stage, &walls, &queries(Query::Count));
-        let early = ask(&stage, &walls, &queries(Query::Any));
-        for (number, (draw, asked)) in boxes.iter().zip(&asked).enumerate() {
-            let plain = quad(&asked[0], &asked[1], &BLUE);
+            queried.iter().map(|[open, close]| quad(open, close, &BLUE).with_state(state)).collect();
+        let queries = |query| boxes.iter().map(|draw| draw.with_query(query)).collect::<Vec<_>>();
+        let count = query(&stage, &walls, &queries(Query::Count));
+        let early = query(&stage, &walls, &queries(Query::Any));
+        for (number, (draw, queried)) in boxes.iter().zip(&queried).enumerate() {
+            let plain = quad(&queried[0], &queried[1], &BLUE);
             prop_assert_eq!(count.passed[number], brute(&stage, &walls, &plain, test), "{:?}", draw.state.depth);
             prop_assert_eq!(early.passed[number] > 0, count.passed[number] > 0);
             prop_assert!(early.passed[number] <= count.passed[number]);
-            let [few, all] = [&early, &count].map(|asked| &asked.draws[number]);
+            let [few, all] = [&early, &count].map(|queried| &queried.draws[number]);
             for event in Event::ALL.into_iter().filter(|event| !is_of_a_cache(*event)) {
                 prop_assert!(few[event] <= all[event], "{event:?}");
             }
@@ -104,9 +104,9 @@ const ALL_OF_IT: ([f32; 2], [f32; 2]) = ([-99.0, 99.0], [-99.0, 99.0]);
 fn behind_a_full_screen_a_query_tests_no_sample() {
     let stage = Stage::sampled(64, 64, 4);
     let [near, far] = [1.0, 2.0].map(|z| rectangle(ALL_OF_IT.0, ALL_OF_IT.1, z));
-    let asked = ask(&stage, &[still(&near, &RED)], &[still(&far, &BLUE).asking(Query::Count)]);
-    let counts = &asked.draws[0];
-    assert_eq!(asked.passed, [0]);
+    let queried = query(&stage, &[still(&near, &RED)], &[still(&far, &BLUE).with_query(Query::Count)]);
+    let counts = &queried.draws[0];
+    assert_eq!(queried.passed, [0]);
     assert!(counts[Event::ZCullTests] > 0);
     for event in [Event::SamplesTested, Event::SamplesScreened, Event::QuadsShaded] {
         assert_eq!(counts[event], 0, "{event:?}");
@@ -122,10 +122,10 @@ fn a_visible_query_ends_after_its_first_tile() {
         [[-99.0, -99.0], [199.0, -99.0], [-99.0, 199.0]].map(|[x, y]: [f32; 2]| Vec3::new(x * z, y * z, z))
     });
     let one = |corners| Draw::new(Geometry::new(corners, corners, &[[0, 1, 2]]).unwrap(), &RED, Cull::None);
-    let of = |query| ask(&stage, &[one(&far)], &[one(&near).asking(query)]);
+    let of = |kind| query(&stage, &[one(&far)], &[one(&near).with_query(kind)]);
     let (count, early) = (of(Query::Count), of(Query::Any));
     assert_eq!((count.passed[0], early.passed[0]), (64 * 64 * 4, 8 * 8 * 4));
-    let hit = |asked: &Asked| asked.draws[0][Event::SamplesHit];
+    let hit = |queried: &Queried| queried.draws[0][Event::SamplesHit];
     assert_eq!(hit(&count), 64 * hit(&early));
     assert_eq!(count.packets.len(), early.packets.len() + 63);
 }
@@ -136,12 +136,12 @@ fn threads_change_no_packet() {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| {
             let (stage, mut r) = (Stage::sampled(90, 70, 4), Uniform::new(5));
-            let (walls, asked) = (rectangles(&mut r, 9), rectangles(&mut r, 80));
+            let (walls, queried) = (rectangles(&mut r, 9), rectangles(&mut r, 80));
             let walls: Vec<Draw<'_>> = walls.iter().map(|[open, close]| quad(open, close, &RED)).collect();
-            let asked: Vec<Draw<'_>> =
-                asked.iter().map(|[open, close]| quad(open, close, &BLUE).asking(Query::Any)).collect();
-            let asked = ask(&stage, &walls, &asked);
-            (asked.passed, asked.packets)
+            let queried: Vec<Draw<'_>> =
+                queried.iter().map(|[open, close]| quad(open, close, &BLUE).with_query(Query::Any)).collect();
+            let queried = query(&stage, &walls, &queried);
+            (queried.passed, queried.packets)
         })
     };
     let (one, three) = (on(1), on(3));
@@ -156,7 +156,7 @@ fn a_query_sees_the_draws_before_it() {
     let spec = spec(Features::ALL);
     let settings =
         Settings { spec: &spec, viewport: stage.viewport, samples: &stage.table, background: Vec3::ZERO };
-    let query = still(&far, &BLUE).asking(Query::Any);
+    let query = still(&far, &BLUE).with_query(Query::Any);
     let draws = [query, still(&near, &RED), query];
     let drawn = RasterPass::new(&stage.camera, &draws, &settings).render(|_, _| ()).unwrap();
     assert!(drawn.passed[0] > 0 && drawn.passed[1..] == [0, 0], "{:?}", drawn.passed);
@@ -170,14 +170,14 @@ fn what_a_query_cannot_do_is_refused() {
     let spec = spec(Features::ALL);
     let settings =
         Settings { spec: &spec, viewport: stage.viewport, samples: &stage.table, background: Vec3::ZERO };
-    let any = still(&corners, &RED).asking(Query::Any);
+    let any = still(&corners, &RED).with_query(Query::Any);
     let hidden = DrawState { colour_mask: [false; 4], ..DrawState::default() };
     let seen = DrawState { depth: DepthState::NONE, ..DrawState::default() };
     for (draw, is_refused) in [
         (any, false),
         (any.with_state(hidden), true),
         (any.with_state(seen), true),
-        (still(&corners, &RED).asking(Query::Count).with_state(DrawState::default()), false),
+        (still(&corners, &RED).with_query(Query::Count).with_state(DrawState::default()), false),
     ] {
         let drawn = RasterPass::new(&stage.camera, &[draw], &settings).render(|_, _| ());
         let expected = PassError::QueryStores { pass: "draw".to_owned(), draw: 0 };

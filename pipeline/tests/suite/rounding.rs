@@ -4,7 +4,7 @@
 
 use crate::common::case::{Case, NEAR, cases, setting};
 use crate::common::*;
-use pipeline::sample_test::{Hits, SampleTest, Target, Width};
+use pipeline::sample_test::{Hits, SampleTest, StoredSamples, VectorWidth};
 use pipeline::setup::{SetupResult, Triangle};
 use pipeline::traversal::*;
 use pipeline::*;
@@ -42,7 +42,7 @@ fn hold(case: Case, seed: u64) -> Found {
 /// Facing, edge bounds and screens over one sample, with either face drawn. Returns whether the exact edges
 /// reject it.
 fn edges_keep(triangle: &Triangle, probe: &Probe, tile: &TileRect, within: &Box5, context: &str) -> bool {
-    let edges = Edges::<f64>::new(View::new(triangle, &probe.shear, tile, within));
+    let edges = Edges::<f64>::new(TileView::new(triangle, &probe.shear, tile, within));
     let slot = (0..probe.samples.len)
         .find(|&slot| {
             [probe.samples.x[slot], probe.samples.y[slot], probe.samples.t[slot]]
@@ -62,11 +62,11 @@ fn edges_keep(triangle: &Triangle, probe: &Probe, tile: &TileRect, within: &Box5
         let hit = |screen: Option<&Screen>| {
             let mut depth = vec![f32::INFINITY; probe.samples.len];
             let mut owner = vec![u32::MAX; probe.samples.len];
-            let mut target = Target { depth: &mut depth, triangle: &mut owner };
+            let mut target = StoredSamples { depth: &mut depth, triangle: &mut owner };
             let (samples, near, hits) = (&samples, -1.0, &mut Hits::default());
             let target = &mut target;
             SampleTest { triangle: &seen, samples, within, image: None, screen, near, target, hits }
-                .run(Width::widest());
+                .run(VectorWidth::widest());
             owner[slot] == triangle.id
         };
         if !hit(None) {

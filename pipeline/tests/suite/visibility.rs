@@ -1,7 +1,7 @@
 //! The fast visibility engine equals brute force over all samples, bit for bit.
 
 use crate::common::*;
-use pipeline::sample_test::Width;
+use pipeline::sample_test::VectorWidth;
 use pipeline::sampling::{Sample, SampleSource};
 use pipeline::visibility::{SampleLayout, Visibility, resolve_at};
 use pipeline::*;
@@ -16,13 +16,13 @@ fn seen(
     lens: bool,
     viewport: Viewport,
     source: &dyn SampleSource,
-    width: Width,
+    width: VectorWidth,
 ) -> Seen {
     let layout = SampleLayout::new(&camera(lens), viewport, source, soup.open != soup.close).unwrap();
     seen_in(&layout, soup, cull, width)
 }
 
-fn seen_in(layout: &SampleLayout, soup: &Soup, cull: Cull, width: Width) -> Seen {
+fn seen_in(layout: &SampleLayout, soup: &Soup, cull: Cull, width: VectorWidth) -> Seen {
     let mut visibility = Visibility::new(layout);
     let geometry = soup.draw(&Plain, cull).geometry;
     // Twice, as the second run must not depend on the first.
@@ -54,7 +54,7 @@ proptest! {
         let viewport = Viewport::new(width, height).unwrap();
         let table = SampleTable::low_discrepancy(per_pixel, seed, LensShape::Disk).unwrap();
         let expected = brute_force(&soup, cull, lens, viewport, &table);
-        agree(&seen(&soup, cull, lens, viewport, &table, Width::widest()), &expected)?;
+        agree(&seen(&soup, cull, lens, viewport, &table, VectorWidth::widest()), &expected)?;
     }
 
     #[test]
@@ -63,7 +63,7 @@ proptest! {
         let viewport = Viewport::new(70, 50).unwrap();
         let table = border_table(seed);
         let expected = brute_force(&soup, Cull::None, lens, viewport, &table);
-        agree(&seen(&soup, Cull::None, lens, viewport, &table, Width::widest()), &expected)?;
+        agree(&seen(&soup, Cull::None, lens, viewport, &table, VectorWidth::widest()), &expected)?;
     }
 
     #[test]
@@ -77,7 +77,7 @@ proptest! {
         let viewport = Viewport::new(64, 48).unwrap();
         let table = SampleTable::low_discrepancy(4, seed, LensShape::Square).unwrap();
         let expected = brute_force(&soup, Cull::None, lens, viewport, &table);
-        agree(&seen(&soup, Cull::None, lens, viewport, &table, Width::widest()), &expected)?;
+        agree(&seen(&soup, Cull::None, lens, viewport, &table, VectorWidth::widest()), &expected)?;
     }
 }
 
@@ -88,7 +88,7 @@ fn every_width_and_number_of_threads_gives_the_same_bytes() {
     for kind in [SoupKind::Moving, SoupKind::Crossing, SoupKind::Slivers, SoupKind::Grid] {
         let soup = Soup::new(kind, 300, 11);
         let expected = brute_force(&soup, Cull::None, true, viewport, &table);
-        for width in Width::available() {
+        for width in VectorWidth::available() {
             for threads in [1, 3] {
                 let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
                 let found = pool.install(|| seen(&soup, Cull::None, true, viewport, &table, width));
@@ -113,7 +113,7 @@ fn dividing_time_for_still_scenes_changes_nothing() {
     for lens in [false, true] {
         let [divided, whole] = [true, false].map(|moving| {
             let layout = SampleLayout::new(&camera(lens), viewport, &table, moving).unwrap();
-            seen_in(&layout, &soup, Cull::None, Width::widest())
+            seen_in(&layout, &soup, Cull::None, VectorWidth::widest())
         });
         assert!(divided == whole, "lens {lens}");
     }
@@ -132,7 +132,7 @@ fn coordinates_out_of_all_proportion_are_seen_as_brute_force_sees_them() {
             }
             for lens in [false, true] {
                 let expected = brute_force(&soup, Cull::None, lens, viewport, &table);
-                let found = seen(&soup, Cull::None, lens, viewport, &table, Width::widest());
+                let found = seen(&soup, Cull::None, lens, viewport, &table, VectorWidth::widest());
                 assert!(found == expected, "{kind:?} times {scale}, lens {lens}");
             }
         }
@@ -156,5 +156,5 @@ fn at_equal_depth_the_lower_number_is_visible_in_any_order() {
     let table = SampleTable::programmed(4, 1, at_half).unwrap();
     let expected = brute_force(&soup, Cull::None, false, viewport, &table);
     assert!(expected.iter().all(|&(id, depth)| (id, f32::from_bits(depth)) == (0, 4.0)), "{:?}", expected[0]);
-    assert!(seen(&soup, Cull::None, false, viewport, &table, Width::widest()) == expected);
+    assert!(seen(&soup, Cull::None, false, viewport, &table, VectorWidth::widest()) == expected);
 }

@@ -1,13 +1,17 @@
 //! All vector widths of this machine find the same hits with the same depths.
 
 use crate::common::*;
-use pipeline::sample_test::{Hits, SampleTest, Target, Width};
+use pipeline::sample_test::{Hits, SampleTest, StoredSamples, VectorWidth};
 use pipeline::sampling::TileSamples;
 use pipeline::setup::{SetupResult, set_up};
 use pipeline::traversal::Box5;
 use pipeline::*;
 
-fn hits_at(width: Width, kind: SoupKind, Optics { lens, parallel }: Optics) -> (Vec<u32>, Vec<u32>, Hits) {
+fn hits_at(
+    width: VectorWidth,
+    kind: SoupKind,
+    Optics { lens, parallel }: Optics,
+) -> (Vec<u32>, Vec<u32>, Hits) {
     let (soup, viewport) = (Soup::new(kind, 200, 5), Viewport::new(64, 64).unwrap());
     let shear = if lens { Shear::new([12.0, -12.0], [2.0, -2.0]) } else { Shear::default() };
     let shear = Shear { parallel, ..shear };
@@ -26,7 +30,7 @@ fn hits_at(width: Width, kind: SoupKind, Optics { lens, parallel }: Optics) -> (
         else {
             continue;
         };
-        let mut target = Target { depth: &mut depth, triangle: &mut seen };
+        let mut target = StoredSamples { depth: &mut depth, triangle: &mut seen };
         let (within, target, hits) = (&Box5::whole(lens), &mut target, &mut hits);
         let (triangle, samples, screen, near) = (&ready, &samples, None, 0.25);
         SampleTest { triangle, samples, within, image: None, screen, near, target, hits }.run(width);
@@ -36,7 +40,7 @@ fn hits_at(width: Width, kind: SoupKind, Optics { lens, parallel }: Optics) -> (
 
 #[test]
 fn every_width_gives_the_same_bytes() {
-    let widths: Vec<Width> = Width::available().collect();
+    let widths: Vec<VectorWidth> = VectorWidth::available().collect();
     println!("widths of this machine: {widths:?}");
     for kind in [SoupKind::Still, SoupKind::Moving, SoupKind::Crossing, SoupKind::Slivers, SoupKind::Grid] {
         for ways in 0..4 {

@@ -4,7 +4,7 @@
 
 use activity::{Event, Unit};
 
-use super::{Estimate, Memory, Structure};
+use super::{IntervalNumber, Memory, Structure};
 
 /// Powers of the accesses a cycle by which the bytes of a memory grow to have room for them: 0 where banks
 /// serve them, which only needs luck and a switch, and 1 for a copy for each. Between, a true multi-port
@@ -36,9 +36,10 @@ impl Case {
         let at =
             |fast: bool, node_nm: u32| all.iter().find(|sram| sram.fast == fast && sram.node_nm == node_nm);
         let published = at(true, MADD_LEAKAGE_NM);
-        let published_mw = published.map_or(1.0, |sram| sram.cost(Cost::LeakageMw, COMPARED_BYTES));
+        let published_mw = published.map_or(1.0, |sram| sram.cost(MemoryCost::LeakageMw, COMPARED_BYTES));
         let case = |sram: &Sram, ports: f64| Self {
-            madd_leakage_mw: MADD_LEAKAGE_MW * sram.cost(Cost::LeakageMw, COMPARED_BYTES) / published_mw,
+            madd_leakage_mw: MADD_LEAKAGE_MW * sram.cost(MemoryCost::LeakageMw, COMPARED_BYTES)
+                / published_mw,
             sram: sram.clone(),
             ports,
         };
@@ -62,12 +63,12 @@ impl Case {
 
     /// Energy of an access of `memory` for each of its bytes, in picojoules.
     pub fn pj_per_byte(&self, memory: &Memory) -> f64 {
-        self.sram.cost(Cost::ReadPj, self.bytes(memory))
+        self.sram.cost(MemoryCost::ReadPj, self.bytes(memory))
     }
 
     /// Leakage of `memory` in milliwatts.
     pub fn memory_leakage_mw(&self, memory: &Memory) -> f64 {
-        memory.copies * self.sram.cost(Cost::LeakageMw, self.bytes(memory))
+        memory.copies * self.sram.cost(MemoryCost::LeakageMw, self.bytes(memory))
     }
 
     /// Leakage of the core in milliwatts. Levels below the L2 have theirs in the platform's rows of units.
@@ -94,7 +95,7 @@ impl Case {
     /// Area of all memories on the core's die in square millimetres on the node `node_nm`.
     fn memories_mm2(&self, structure: &Structure, node_nm: u32) -> f64 {
         let length = f64::from(node_nm) / f64::from(self.sram.node_nm);
-        let mm2 = |memory: &Memory| memory.copies * self.sram.cost(Cost::AreaMm2, self.bytes(memory));
+        let mm2 = |memory: &Memory| memory.copies * self.sram.cost(MemoryCost::AreaMm2, self.bytes(memory));
         let memories = structure.memories.iter().filter(|memory| memory.unit != Unit::Edram);
         length * length * memories.map(mm2).sum::<f64>()
     }
@@ -106,18 +107,18 @@ fn on_core(structure: &Structure) -> impl Iterator<Item = &Memory> {
 }
 
 /// Area of `structure` in square millimetres on the node `node_nm`.
-pub(super) fn area_mm2(structure: &Structure, node_nm: u32) -> Estimate {
+pub(super) fn area_mm2(structure: &Structure, node_nm: u32) -> IntervalNumber {
     let cases: Vec<Case> = Case::all().into_iter().filter(|case| case.is_nearest(node_nm)).collect();
     let nominal = cases.iter().find(|case| case.is_nominal(node_nm));
     let mm2 = |case: &Case| case.memories_mm2(structure, node_nm);
-    let memories = Estimate::over(nominal.map_or(0.0, mm2), cases.iter().map(mm2));
+    let memories = IntervalNumber::over(nominal.map_or(0.0, mm2), cases.iter().map(mm2));
     let square_mm2 = f64::from(node_nm) * f64::from(node_nm) * 1e-12;
     let logic = structure.madds.iter().sum::<f64>() * square_mm2;
     let edram: f64 =
         structure.memories.iter().filter(|m| m.unit == Unit::Edram).map(|m| m.bytes * m.copies).sum();
     let [low, middle, high] = MADD_SQUARES.map(|squares| squares * logic);
     let [edram_low, edram_middle, edram_high] = EDRAM_MM2_PER_BYTE.map(|mm2| mm2 * edram);
-    memories.plus(Estimate { low, nominal: middle, high }).plus(Estimate {
+    memories.plus(IntervalNumber { low, nominal: middle, high }).plus(IntervalNumber {
         low: edram_low,
         nominal: edram_middle,
         high: edram_high,
@@ -200,7 +201,7 @@ pub const INTERPOLATION: f64 = 1.5;
 
 /// A cost of a memory.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Cost {
+pub enum MemoryCost {
     /// Energy of a read for each byte of the port, in picojoules.
     ReadPj,
     /// Leakage in milliwatts.
@@ -209,7 +210,7 @@ pub enum Cost {
     AreaMm2,
 }
 
-impl Cost {
+impl MemoryCost {
     /// All costs.
     pub const ALL: [Self; 3] = [Self::ReadPj, Self::LeakageMw, Self::AreaMm2];
 }
@@ -223,7 +224,7 @@ pub struct SramRun {
     pub node_nm: u32,
     /// Size in bytes.
     pub bytes: f64,
-    /// Costs, in the order of [`Cost::ALL`].
+    /// Costs, in the order of [`MemoryCost::ALL`].
     pub costs: [f64; 3],
 }
 
@@ -254,7 +255,7 @@ pub struct Sram {
     pub node_nm: u32,
     /// Logarithm of the size of each run, rising.
     ln_bytes: Vec<f64>,
-    /// Logarithms of the costs of each run, in the order of [`Cost::ALL`].
+    /// Logarithms of the costs of each run, in the order of [`MemoryCost::ALL`].
     ln_costs: [Vec<f64>; 3],
 }
 
@@ -270,15 +271,15 @@ impl Sram {
     }
 
     fn of_kind(runs: &[SramRun]) -> Self {
-        let ln_costs =
-            Cost::ALL.map(|cost| never_falling(runs.iter().map(|run| libm::log(run.costs[cost as usize]))));
+        let ln_costs = MemoryCost::ALL
+            .map(|cost| never_falling(runs.iter().map(|run| libm::log(run.costs[cost as usize]))));
         let ln_bytes = runs.iter().map(|run| libm::log(run.bytes)).collect();
         Self { fast: runs[0].fast, node_nm: runs[0].node_nm, ln_bytes, ln_costs }
     }
 
     /// Cost of a memory of `bytes` with one port: a straight line between runs in logarithms, the nearest of
     /// these lines beyond the runs. Nothing costs nothing.
-    pub fn cost(&self, cost: Cost, bytes: f64) -> f64 {
+    pub fn cost(&self, cost: MemoryCost, bytes: f64) -> f64 {
         if bytes <= 0.0 {
             return 0.0;
         }
@@ -321,7 +322,7 @@ mod tests {
         let runs = SramRun::all();
         let run = runs.iter().find(|run| run.fast && run.node_nm == 28 && run.bytes == 8192.0).unwrap();
         let sram = Sram::all().into_iter().find(|sram| sram.fast && sram.node_nm == 28).unwrap();
-        for cost in Cost::ALL {
+        for cost in MemoryCost::ALL {
             assert!((sram.cost(cost, 8192.0) / run.costs[cost as usize] - 1.0).abs() < 1e-12, "{cost:?}");
             assert_eq!(sram.cost(cost, 0.0), 0.0);
         }
@@ -330,7 +331,7 @@ mod tests {
     #[test]
     fn no_cost_falls_with_size() {
         for sram in Sram::all() {
-            for cost in Cost::ALL {
+            for cost in MemoryCost::ALL {
                 let costs: Vec<f64> =
                     (0..400).map(|at| sram.cost(cost, libm::exp(0.06 * f64::from(at)))).collect();
                 assert!(costs.is_sorted() && costs[0] > 0.0, "{cost:?} of {sram:?}");

@@ -2,7 +2,8 @@
 
 use activity::{Event, Unit};
 use power_model::{
-    Bound, Charge, Cost, Estimate, INTERPOLATION, Memory, PowerModel, Scaling, Sram, SramRun, Structure,
+    Bound, Charge, INTERPOLATION, IntervalNumber, Memory, MemoryCost, PowerModel, Scaling, Sram, SramRun,
+    Structure,
 };
 
 use super::common::{reference, table};
@@ -12,7 +13,7 @@ use super::common::{reference, table};
 #[test]
 fn a_run_that_is_left_out_lies_within_the_stated_interval() {
     let runs = SramRun::all();
-    for cost in Cost::ALL {
+    for cost in MemoryCost::ALL {
         let mut errors: Vec<f64> = Vec::new();
         for (at, left) in runs.iter().enumerate() {
             let others: Vec<SramRun> =
@@ -42,10 +43,10 @@ fn a_run_that_is_left_out_lies_within_the_stated_interval() {
 fn a_cache_of_4_mb_costs_what_cacti_says_beside_one_of_16_kb() {
     let all = Sram::all();
     let fast = all.iter().find(|sram| sram.fast && sram.node_nm == 28).unwrap();
-    let ratio = |cost: Cost| fast.cost(cost, 4_194_304.0) / fast.cost(cost, 16_384.0);
-    assert!((ratio(Cost::ReadPj) - (328.84 / 64.0) / (5.25 / 32.0)).abs() < 1e-9);
-    assert!((ratio(Cost::LeakageMw) - 842.823 / 4.12966).abs() < 1e-9);
-    assert!((ratio(Cost::AreaMm2) - 6.0703 / 0.0208158).abs() < 1e-9);
+    let ratio = |cost: MemoryCost| fast.cost(cost, 4_194_304.0) / fast.cost(cost, 16_384.0);
+    assert!((ratio(MemoryCost::ReadPj) - (328.84 / 64.0) / (5.25 / 32.0)).abs() < 1e-9);
+    assert!((ratio(MemoryCost::LeakageMw) - 842.823 / 4.12966).abs() < 1e-9);
+    assert!((ratio(MemoryCost::AreaMm2) - 6.0703 / 0.0208158).abs() < 1e-9);
 }
 
 /// One cache of `bytes` with some logic beside it.
@@ -104,7 +105,7 @@ fn equal_structures_have_ratios_of_one() {
     let home = structure(16_384.0, 3.0);
     assert_eq!(Scaling::new(&home.clone(), &home, &home, 28), Scaling::default());
     assert_eq!(Scaling::default().farthest().0, 1.0);
-    assert_eq!(Scaling::default().event(Event::L2Reads), Estimate::ONE);
+    assert_eq!(Scaling::default().event(Event::L2Reads), IntervalNumber::ONE);
 }
 
 /// Watts of files have a range; those computed from a machine that nobody could build do not, so that it is

@@ -2,7 +2,7 @@
 
 use activity::Event;
 use power_model::{
-    Bound, Cause, Circumstances, FramePower, PacedFrame, Pacing, PacingError, Platform, Pulse, Run,
+    Bound, Cause, Circumstances, FramePower, PacedFrame, PacedRun, Pacing, PacingError, Platform, Pulse,
     Surrounded, overlay, pace,
 };
 use proptest::prelude::*;
@@ -27,7 +27,7 @@ fn quiet(but: &str) -> Platform {
 }
 
 /// Equal frames of 20 ms at 30 frames per second.
-fn thirty(platform: &Platform, frames: usize) -> Run {
+fn thirty(platform: &Platform, frames: usize) -> PacedRun {
     let frame: FramePower =
         model(platform).frame(&steady(MS_PS, 20, Event::ShaderOps, 4_000_000, MS_PS / 2)).unwrap();
     pace(&vec![&frame; frames], platform, Pacing::vsync(30.0).unwrap()).unwrap()

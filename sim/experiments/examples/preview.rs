@@ -5,7 +5,7 @@ use std::error::Error;
 use std::path::Path;
 
 use experiments::all;
-use experiments::study::Request;
+use experiments::study::StudyRequest;
 use output::OutDir;
 use output::plot::PlotStyle;
 use output::terminal::Progress;
@@ -22,7 +22,14 @@ fn main() -> Result<(), Box<dyn Error>> {
     let (plot_style, progress) = (PlotStyle::default(), Progress::new(true));
     let done = OutDir::with(Path::new(folder), study.claim(), |dir| {
         let plot_style = &plot_style;
-        study.run(&Request { quick: true, scenes: &[], seed: None, dir, plot_style, progress: &progress })
+        study.run(&StudyRequest {
+            quick: true,
+            scenes: &[],
+            seed: None,
+            dir,
+            plot_style,
+            progress: &progress,
+        })
     })??;
     print!("{}", done.text);
     println!("{} points between speed and accuracy", done.tradeoff.len());

@@ -36,35 +36,35 @@ use self::chart::sampled::SampledChart;
 use self::chart::sampling::SamplingChart;
 use self::chart::soft_shadows::SoftShadowsChart;
 use self::chart::stated_errors::StatedErrorsChart;
-use self::chart::tile_tests::TileTests;
+use self::chart::tile_tests::TileTestsChart;
 use self::chart::timing::TimingChart;
 use self::stress::StressChart;
-use self::study::Entry;
+use self::study::StudyEntry;
 
 /// The charts of the book.
-pub static CHARTS: &[Entry] = &[
-    Entry::of::<AnchorsChart>(),
-    Entry::of::<CausticsChart>(),
-    Entry::of::<CcdChart>(),
-    Entry::of::<ComputeChart>(),
-    Entry::of::<DeferredChart>(),
-    Entry::of::<FramesChart>(),
-    Entry::of::<GlossyChart>(),
-    Entry::of::<GrowthChart>(),
-    Entry::of::<MemoryChart>(),
-    Entry::of::<MultiviewChart>(),
-    Entry::of::<OcclusionChart>(),
-    Entry::of::<PointsChart>(),
-    Entry::of::<SampledChart>(),
-    Entry::of::<SamplingChart>(),
-    Entry::of::<SoftShadowsChart>(),
-    Entry::of::<StatedErrorsChart>(),
-    Entry::of::<TileTests>(),
-    Entry::of::<TimingChart>(),
+pub static CHARTS: &[StudyEntry] = &[
+    StudyEntry::of::<AnchorsChart>(),
+    StudyEntry::of::<CausticsChart>(),
+    StudyEntry::of::<CcdChart>(),
+    StudyEntry::of::<ComputeChart>(),
+    StudyEntry::of::<DeferredChart>(),
+    StudyEntry::of::<FramesChart>(),
+    StudyEntry::of::<GlossyChart>(),
+    StudyEntry::of::<GrowthChart>(),
+    StudyEntry::of::<MemoryChart>(),
+    StudyEntry::of::<MultiviewChart>(),
+    StudyEntry::of::<OcclusionChart>(),
+    StudyEntry::of::<PointsChart>(),
+    StudyEntry::of::<SampledChart>(),
+    StudyEntry::of::<SamplingChart>(),
+    StudyEntry::of::<SoftShadowsChart>(),
+    StudyEntry::of::<StatedErrorsChart>(),
+    StudyEntry::of::<TileTestsChart>(),
+    StudyEntry::of::<TimingChart>(),
 ];
 
 /// The failure catalogue, which has a command of its own.
-pub static STRESS: Entry = Entry::of::<StressChart>();
+pub static STRESS: StudyEntry = StudyEntry::of::<StressChart>();
 
 /// Name and one line of `chart all`.
 pub const ALL: (&str, &str) = (
@@ -73,7 +73,7 @@ pub const ALL: (&str, &str) = (
 );
 
 /// The charts and the failure catalogue.
-pub fn all() -> impl Iterator<Item = &'static Entry> {
+pub fn all() -> impl Iterator<Item = &'static StudyEntry> {
     CHARTS.iter().chain([&STRESS])
 }
 

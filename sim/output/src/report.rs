@@ -220,7 +220,7 @@ pub struct FrameNumbers {
 /// Row of a frame.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct FrameRow {
-    /// Its number.
+    /// Number of the frame.
     pub frame: u64,
     /// Start in seconds.
     pub start_s: f64,
@@ -237,7 +237,7 @@ pub struct FrameRow {
 /// Row of the passes of one name.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct PassRow {
-    /// Its name.
+    /// Name of the pass.
     pub name: String,
     /// Number of passes.
     pub passes: u64,
@@ -270,7 +270,7 @@ pub struct WorkRow {
 /// Row of a unit.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct UnitRow {
-    /// Its name.
+    /// Name of the unit.
     pub name: String,
     /// Description, one sentence.
     pub doc: String,

@@ -236,7 +236,7 @@ pub struct JobFrame {
     pub report: FrameReport,
     /// Power over time.
     pub power: FramePower,
-    /// Its passes, in order.
+    /// Passes of the frame, in order.
     pub passes: Vec<PassEnergy>,
     /// Energy of writing results to memory when the frame ends, J.
     pub write_back_j: f64,
@@ -245,7 +245,7 @@ pub struct JobFrame {
 /// Energy of a pass.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PassEnergy {
-    /// Its name.
+    /// Name of the pass.
     pub name: String,
     /// When its last packet leaves, s from the start of the frame.
     pub end_s: f64,

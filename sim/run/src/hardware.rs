@@ -138,12 +138,21 @@ fn fixed(gpu: &GpuSpec) -> Vec<Memory> {
 
 /// Caches above memory.
 fn caches(gpu: &GpuSpec) -> Vec<Memory> {
-    let access = Charge::access;
-    let entries = |cache: CacheSpec| f64::from(cache.entries);
+    let mut all = Vec::from(line_caches(gpu));
+    all.extend(shaded_quads(gpu));
     let cache = &gpu.pipeline.memory;
-    let quads = entries(gpu.pipeline.shading_cache);
-    let [data, tag] = QUAD_BYTES;
-    let mut all = vec![
+    let units = [Unit::Llc, Unit::Edram].into_iter().zip(cache.levels()).zip(gpu.units.levels());
+    all.extend(units.filter_map(|((unit, size), spec)| {
+        Some(level(unit, f64::from(size?.entries) * LINE, f64::from(spec?.lines_per_cycle.get())))
+    }));
+    all
+}
+
+/// Caches of lines, the L2 among them.
+fn line_caches(gpu: &GpuSpec) -> [Memory; 4] {
+    let access = Charge::access;
+    let cache = &gpu.pipeline.memory;
+    [
         of_lines(
             "depth_cache",
             cache.depth,
@@ -183,6 +192,14 @@ fn caches(gpu: &GpuSpec) -> Vec<Memory> {
                 access(Event::L2Misses),
             ],
         ),
+    ]
+}
+
+/// The cache of shaded quads, their colours and their tags.
+fn shaded_quads(gpu: &GpuSpec) -> [Memory; 2] {
+    let quads = f64::from(gpu.pipeline.shading_cache.entries);
+    let [data, tag] = QUAD_BYTES;
+    [
         Memory {
             accesses: rate(gpu, Event::QuadsShaded),
             ..memory(
@@ -190,7 +207,7 @@ fn caches(gpu: &GpuSpec) -> Vec<Memory> {
                 Unit::ShadingCache,
                 quads * data,
                 data,
-                vec![access(Event::ShadingHits), access(Event::QuadsShaded)],
+                vec![Charge::access(Event::ShadingHits), Charge::access(Event::QuadsShaded)],
             )
         },
         Memory {
@@ -203,12 +220,7 @@ fn caches(gpu: &GpuSpec) -> Vec<Memory> {
                 vec![Charge::shares(Event::ShadingLookups, 0.88, 0.0)],
             )
         },
-    ];
-    let units = [Unit::Llc, Unit::Edram].into_iter().zip(cache.levels()).zip(gpu.units.levels());
-    all.extend(units.filter_map(|((unit, size), spec)| {
-        Some(level(unit, entries(size?) * LINE, f64::from(spec?.lines_per_cycle.get())))
-    }));
-    all
+    ]
 }
 
 /// A cache of lines of 64 bytes. Its unit is that of the first event it is charged for.
@@ -278,7 +290,7 @@ fn queues(gpu: &GpuSpec, unit: Unit) -> [Memory; 2] {
 /// More hardware costs more, and the GPU of a platform keeps its numbers.
 #[cfg(test)]
 pub(crate) mod tests {
-    use power_model::{Bound, EnergyTable, Estimate, PowerModel};
+    use power_model::{Bound, EnergyTable, IntervalNumber, PowerModel};
     use proptest::prelude::*;
 
     use super::*;
@@ -447,8 +459,8 @@ pub(crate) mod tests {
         let platform = Platform::builtin("reference").unwrap();
         let larger = changed("reference", &[("pipeline.memory.texture.entries", 4096.0)]);
         let scaling = scaling(&larger, &platform).unwrap();
-        assert_eq!(scaling.event(Event::DepthLines), Estimate::ONE);
-        assert_eq!(scaling.clock_tree(Unit::Depth), Estimate::ONE);
+        assert_eq!(scaling.event(Event::DepthLines), IntervalNumber::ONE);
+        assert_eq!(scaling.clock_tree(Unit::Depth), IntervalNumber::ONE);
         let lines = scaling.event(Event::TextureLines);
         assert!(1.5 < lines.low && lines.low <= lines.nominal && lines.nominal <= lines.high, "{lines:?}");
         assert_eq!(lines, scaling.event(Event::TextureMisses));
@@ -459,7 +471,7 @@ pub(crate) mod tests {
         let platform = Platform::builtin("reference").unwrap();
         let fast = changed("reference", &[("core_hz", 800e6)]);
         let scaling = scaling(&fast, &platform).unwrap();
-        assert_eq!(scaling.leakage, Estimate::ONE);
+        assert_eq!(scaling.leakage, IntervalNumber::ONE);
         for unit in Unit::ALL.into_iter().filter(|unit| !unit.is_optional()) {
             let ratio = if unit == Unit::Dram { 1.0 } else { 2.0 };
             assert_eq!(scaling.clock_tree(unit).nominal, ratio, "{}", unit.name());

@@ -9,7 +9,7 @@ use super::{HeatQuantity, Plan, RunError};
 use output::OutDir;
 use output::dir::BoxError;
 use output::image::LinearImage;
-use output::plot::{HeatMapPlot, HeatTile, Picture, Shading};
+use output::plot::{HeatMapPlot, HeatScale, HeatTile, Picture};
 use output::table::{grouped, si};
 
 /// Heat map of the report.
@@ -166,7 +166,7 @@ impl Heat {
             },
             size: [plan.viewport.width(), plan.viewport.height()],
             tiles: &if self.is_by_pixel { self.blocks(plan, side) } else { self.fine_tiles(plan) },
-            shading: Shading::Clipped,
+            shading: HeatScale::Clipped,
             brightness,
         };
         plot.picture(&plan.options.plot_style)

@@ -73,7 +73,7 @@ pub use provenance::{HardwareSummary, Host, Input, Provenance, again, area_mm2};
 pub use recording::{DrawnFrames, MACHINES_IN_TURN, RecordedRun, TimedFrames};
 pub use sampled::{Forecast, FramePreview, Previewer, Previews, Signatures};
 pub use simulated::{
-    CONFIDENCE, FrameCost, Modelled, Observed, Origin, Quantity, RunFrame, SampledSummary, Simulated,
+    CONFIDENCE, FrameCost, Modelled, Observed, Origin, RunFrame, RunQuantity, SampledSummary, Simulated,
     StatedError,
 };
 pub use summary::{Detection, Figures, FrameRow, Summary};

@@ -1,9 +1,9 @@
 //! Measurement of a run: the power curve is recorded as a trace, and frames and energies are found in the trace.
 
 use output::table::si;
-use power_model::{FramePower, PARTS, Run, pace};
+use power_model::{FramePower, PARTS, PacedRun, pace};
 use serde::Serialize;
-use traces::device::{Device, DeviceSpec, RATES_HZ, SampleError, Sampled};
+use traces::device::{Device, DeviceSpec, RATES_HZ, SampleError, SampledTrace};
 use traces::energy::{self, FrameEnergy, PowerIntegral, Score, TOLERANCE_S, TrueFrame};
 use traces::frames::{Found, MarkError, Marks, default_window, find, marked_only};
 use traces::{Mark, MarkKind, Metadata, Trace};
@@ -15,7 +15,7 @@ use crate::{Plan, RunError, Simulated};
 /// Trace of a run, and the frames found in it.
 pub struct Measurement {
     /// Paced frames and their power curve: the ground truth.
-    pub run: Run,
+    pub run: PacedRun,
     /// The trace as recorded.
     pub trace: Trace,
     /// Number of clipped samples, currents and voltages.
@@ -66,7 +66,7 @@ pub(super) fn measure(plan: &Plan, simulated: &Simulated) -> Result<Measurement,
     // Frames may take longer than one tick of the display.
     trace_fits(run.curve.end_s(), resolution.rate_hz)?;
     let device = Device::new(device_spec(plan, resolution.rate_hz, &powers))?;
-    let Sampled { mut trace, clipped_currents, clipped_voltages } =
+    let SampledTrace { mut trace, clipped_currents, clipped_voltages } =
         device.sample(&run.curve, 0.0, run.curve.end_s()).map_err(|error| match error {
             SampleError::TooShort { .. } => too_slow(plan, &resolution, &run),
             error => error.into(),
@@ -93,7 +93,7 @@ pub(super) fn measure(plan: &Plan, simulated: &Simulated) -> Result<Measurement,
 }
 
 /// The error for a sampling rate at which no window fits the marked frame.
-fn too_slow(plan: &Plan, resolution: &Resolution, run: &Run) -> RunError {
+fn too_slow(plan: &Plan, resolution: &Resolution, run: &PacedRun) -> RunError {
     let frame_s = shortest_frame_s(run);
     let needed_hz = (MIN_BUSY_SAMPLES / resolution.shortest_busy_s).max(MIN_WINDOW_SAMPLES / frame_s);
     let remedy = match rate_from(needed_hz) {
@@ -107,13 +107,13 @@ fn too_slow(plan: &Plan, resolution: &Resolution, run: &Run) -> RunError {
 }
 
 /// Length of the shortest frame in seconds.
-fn shortest_frame_s(run: &Run) -> f64 {
+fn shortest_frame_s(run: &PacedRun) -> f64 {
     run.frames.iter().map(|frame| frame.end_s - frame.start_s).fold(f64::INFINITY, f64::min)
 }
 
 /// Marks the middle frame, which is past the warm-up. The end mark is the end of the run, or the end of the
 /// trace if that is earlier by part of a sample.
-fn marks(run: &Run, trace: &Trace) -> Marks {
+fn marks(run: &PacedRun, trace: &Trace) -> Marks {
     let middle = &run.frames[run.frames.len() / 2];
     let window = default_window(shortest_frame_s(run), trace.rate_hz());
     Marks::one(middle.start_s, window, run.end_s.min(trace.end_s()))
@@ -136,7 +136,7 @@ fn metadata(plan: &Plan, device: &Device, marks: &Marks) -> Metadata {
 }
 
 /// Mean power of each part in watts, from the first start to the last end, idle time included.
-pub(super) fn mean_parts_w(run: &Run) -> [f64; PARTS] {
+pub(super) fn mean_parts_w(run: &PacedRun) -> [f64; PARTS] {
     let length_s = run.end_s - run.start_s;
     run.energy().by_part_j.map(|joules| joules / length_s)
 }
@@ -167,7 +167,7 @@ pub struct Resolution {
 
 impl Resolution {
     /// Resolution of the frames of `run` at `given_hz`, or at the lowest rate that resolves them.
-    pub(super) fn new(given_hz: Option<f64>, run: &Run) -> Self {
+    pub(super) fn new(given_hz: Option<f64>, run: &PacedRun) -> Self {
         let busy_s = run.frames.iter().map(|frame| frame.busy_end_s - frame.start_s);
         let shortest_busy_s = busy_s.fold(f64::INFINITY, f64::min);
         let rate_hz =
@@ -249,7 +249,7 @@ pub struct Checks {
 
 impl Checks {
     pub(super) fn new(
-        run: &Run,
+        run: &PacedRun,
         device: &Device,
         integral: &PowerIntegral<'_>,
         found: &Found,

@@ -8,7 +8,7 @@ use pipeline::Viewport;
 use power_model::{Bound, EnergyTable, ModelError, Pacing, Platform, PowerModel, Scaling};
 use traces::device::RATES_HZ;
 use warnings::Warning;
-use workloads::job::{Reduction, Request};
+use workloads::job::{JobRequest, Reduction};
 use workloads::{Job, Rendering, Settings, catalog};
 
 use crate::RunError;
@@ -214,11 +214,11 @@ fn check_recorder(options: &RunOptions) -> Result<(), RunError> {
     Ok(())
 }
 
-/// Checks that a run of images alone asks for nothing that needs counts or time.
+/// Checks that a run of images alone requests nothing that needs counts or time.
 fn check_images(options: &RunOptions) -> Result<(), RunError> {
     let defaults = RunOptions::default();
     let Requested { accuracy, budget_s } = options.requested;
-    let asked = [
+    let requested = [
         ("--heat", !options.heat.is_empty()),
         ("--accuracy", accuracy.is_some()),
         ("--budget", budget_s.is_some()),
@@ -232,7 +232,7 @@ fn check_images(options: &RunOptions) -> Result<(), RunError> {
         ("--packet-loss", options.packet_loss != 0.0),
         ("the style of plots", options.plot_style != defaults.plot_style),
     ];
-    let given = asked.into_iter().filter(|(_, given)| *given).map(|(name, _)| name.to_owned());
+    let given = requested.into_iter().filter(|(_, given)| *given).map(|(name, _)| name.to_owned());
     let is_of_power = |change: &&Change| {
         matches!(InputFile::of(&change.path), Some(InputFile::Platform | InputFile::Table))
     };
@@ -285,8 +285,8 @@ fn load_job(options: &RunOptions, changes: &mut Changes<'_>) -> Result<(String, 
     }
 }
 
-fn request(options: &RunOptions) -> Request<'_> {
-    Request { overrides: &options.overrides, seed: options.seed }
+fn request(options: &RunOptions) -> JobRequest<'_> {
+    JobRequest { overrides: &options.overrides, seed: options.seed }
 }
 
 fn file_or_name<T, E>(
@@ -413,8 +413,8 @@ mod tests {
         let change = |path: &str| Change { path: path.to_owned(), value: "1".to_owned() };
         let changes =
             ["gpu.pipeline.tile_px", "platform.v_v", "table.rows.draws.nominal_pj"].map(change).into();
-        let asked = RunOptions { verify: true, packet_loss: 0.5, changes, ..images };
-        let message = check_images(&asked).unwrap_err().to_string();
+        let requested = RunOptions { verify: true, packet_loss: 0.5, changes, ..images };
+        let message = check_images(&requested).unwrap_err().to_string();
         let says = "--verify, --packet-loss, --set platform.v_v, --set table.rows.draws.nominal_pj needs";
         assert!(message.contains(says), "{message}");
     }

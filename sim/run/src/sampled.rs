@@ -21,7 +21,7 @@ use workloads::Job;
 use workloads::job::Reduction;
 
 use crate::frame::{FrameSimulator, SimulatedFrame};
-use crate::{Distinct, FrameCost, Origin, Plan, Quantity, RunError, RunFrame, SampledSummary, Simulated};
+use crate::{Distinct, FrameCost, Origin, Plan, RunError, RunFrame, RunQuantity, SampledSummary, Simulated};
 
 /// Previews of the frames of a run, and the pilot frame.
 pub struct Previews<'a> {
@@ -222,17 +222,17 @@ impl Forecast {
     }
 
     /// Mean cycles per frame.
-    pub fn cycles_per_frame(&self) -> Quantity {
+    pub fn cycles_per_frame(&self) -> RunQuantity {
         self.cycles.total(CONFIDENCE).scaled(1.0 / self.frames()).into()
     }
 
     /// Mean energy per frame in joules while busy.
-    pub fn energy_per_frame_j(&self) -> Quantity {
+    pub fn energy_per_frame_j(&self) -> RunQuantity {
         self.energy.total(CONFIDENCE).scaled(1.0 / self.frames()).into()
     }
 
     /// Mean power in watts while busy.
-    pub fn busy_power_w(&self, core_hz: f64) -> Quantity {
+    pub fn busy_power_w(&self, core_hz: f64) -> RunQuantity {
         self.energy.ratio(&self.cycles, CONFIDENCE).scaled(core_hz).into()
     }
 

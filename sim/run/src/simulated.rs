@@ -148,7 +148,7 @@ pub struct FrameCost {
 
 /// Quantity of the run with its confidence interval.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Quantity {
+pub struct RunQuantity {
     /// Estimate.
     pub value: f64,
     /// Lower end of the 95 % interval.
@@ -159,14 +159,14 @@ pub struct Quantity {
     pub relative_half_width: f64,
 }
 
-impl From<Interval> for Quantity {
+impl From<Interval> for RunQuantity {
     fn from(interval: Interval) -> Self {
         let Interval { value, low, high } = interval;
         Self { value, low, high, relative_half_width: interval.relative() }
     }
 }
 
-impl Quantity {
+impl RunQuantity {
     /// Whether the interval contains `truth`.
     pub fn holds(&self, truth: f64) -> bool {
         (self.low..=self.high).contains(&truth)
@@ -189,16 +189,16 @@ pub struct SampledSummary {
     /// Confidence level of the intervals.
     pub confidence: f64,
     /// Mean cycles per frame.
-    pub cycles_per_frame: Quantity,
+    pub cycles_per_frame: RunQuantity,
     /// Mean energy per frame in joules while the GPU is busy, without idle time.
-    pub busy_energy_per_frame_j: Quantity,
+    pub busy_energy_per_frame_j: RunQuantity,
     /// Mean power in watts while the GPU is busy.
-    pub busy_power_w: Quantity,
+    pub busy_power_w: RunQuantity,
 }
 
 impl SampledSummary {
     /// The three quantities with names and units.
-    pub fn quantities(&self) -> [(&'static str, &'static str, Quantity); 3] {
+    pub fn quantities(&self) -> [(&'static str, &'static str, RunQuantity); 3] {
         [
             ("cycles per frame", "", self.cycles_per_frame),
             ("energy per frame while busy", "J", self.busy_energy_per_frame_j),

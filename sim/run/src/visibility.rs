@@ -30,7 +30,7 @@ use crate::{Distinct, Host, Input, Plan, Prepared, Provenance, RunError, RunOpti
 
 /// Rates in samples of the image per second.
 #[derive(Clone, Copy, Debug, Serialize)]
-pub struct Rates {
+pub struct SampleRates {
     /// By CPU time per thread in set-up, binning, tests and depth: median of all runs.
     pub samples_per_s: f64,
     /// The same of the fastest run.
@@ -44,11 +44,11 @@ pub struct Rates {
 }
 
 /// Visible triangles and rates.
-pub struct Found {
+pub struct VisibilityResult {
     /// Triangle and depth of each sample, in the order `(y width + x) per_pixel + index`.
     pub seen: Vec<VisibleTriangle>,
     /// Rates.
-    pub rates: Rates,
+    pub rates: SampleRates,
 }
 
 /// Time of one run: CPU seconds of all threads, and wall-clock seconds.
@@ -68,7 +68,7 @@ pub fn find(
     source: &dyn SampleSource,
     tests: Option<Features>,
     runs: u16,
-) -> Result<Found, String> {
+) -> Result<VisibilityResult, String> {
     // The same array at both ends is a still mesh.
     let close = if scene.open == scene.close { &scene.open } else { &scene.close };
     let geometry = Geometry::new(&scene.open, close, &scene.triangles).map_err(|error| error.to_string())?;
@@ -116,7 +116,7 @@ fn fastest(
     source: &dyn SampleSource,
     geometry: &Geometry<'_>,
     runs: u16,
-) -> Option<Found> {
+) -> Option<VisibilityResult> {
     let before = Instant::now();
     let layout = SampleLayout::new(&scene.camera, scene.viewport, source, !geometry.is_still())?;
     let mut visibility = Visibility::new(&layout);
@@ -125,7 +125,7 @@ fn fastest(
         (0..runs).map(|_| timed(|| resolve(&layout, geometry, Cull::None, &mut visibility)).1).collect();
     let after = Instant::now();
     let seen = visibility.in_image_order(&layout);
-    Some(Found { rates: rates(seen.len(), timed, before_s + after.elapsed().as_secs_f64()), seen })
+    Some(VisibilityResult { rates: rates(seen.len(), timed, before_s + after.elapsed().as_secs_f64()), seen })
 }
 
 fn modelled(
@@ -134,7 +134,7 @@ fn modelled(
     geometry: Geometry<'_>,
     features: Features,
     runs: u16,
-) -> Result<Found, String> {
+) -> Result<VisibilityResult, String> {
     let gpu = GpuSpec::load("reference").map_err(|error| error.to_string())?;
     let spec = PipelineSpec { features, ..gpu.pipeline };
     let background = Vec3::ZERO;
@@ -147,7 +147,10 @@ fn modelled(
         all.push(run);
     }
     let rates = rates(seen.len(), all, 0.0);
-    Ok(Found { seen: seen.into_iter().map(|(id, depth)| (id, f32::from_bits(depth))).collect(), rates })
+    Ok(VisibilityResult {
+        seen: seen.into_iter().map(|(id, depth)| (id, f32::from_bits(depth))).collect(),
+        rates,
+    })
 }
 
 fn timed<T>(work: impl FnOnce() -> T) -> (T, RunTime) {
@@ -157,12 +160,12 @@ fn timed<T>(work: impl FnOnce() -> T) -> (T, RunTime) {
 }
 
 /// Rates of runs over `samples`. `outside_s` are the seconds before and after the runs.
-fn rates(samples: usize, mut runs: Vec<RunTime>, outside_s: f64) -> Rates {
+fn rates(samples: usize, mut runs: Vec<RunTime>, outside_s: f64) -> SampleRates {
     let (samples, threads) = (samples as f64, rayon::current_num_threads());
     runs.sort_by(|a, b| a.cpu_s.total_cmp(&b.cpu_s));
     let rate = |run: &RunTime| samples * threads as f64 / run.cpu_s.max(f64::MIN_POSITIVE);
     let median = &runs[runs.len() / 2];
-    Rates {
+    SampleRates {
         samples_per_s: rate(median),
         best_samples_per_s: rate(&runs[0]),
         end_to_end_samples_per_s: samples / (outside_s + median.wall_s),

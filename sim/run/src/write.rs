@@ -8,7 +8,7 @@ use power_model::Part;
 use timing::{DrawSpan, PassTime};
 use traces::energy::{ExtraColumn, FrameEnergy, FrameTable, TOLERANCE_S, truth_beside};
 use traces::io::perfetto::{
-    self, CounterTrack, FrameSpan, MAX_SLICES, PassSpan, PerfettoTimeline, UnitTrack, slices_of_bins,
+    self, CounterTrack, FrameSlice, MAX_SLICES, PassSpan, PerfettoTimeline, UnitTrack, slices_of_bins,
 };
 
 use crate::frame::image_name;
@@ -118,7 +118,7 @@ fn ns(time_s: f64) -> u64 {
     (time_s * NS).round() as u64
 }
 
-fn frames(outcome: &FinishedRun) -> Vec<FrameSpan> {
+fn frames(outcome: &FinishedRun) -> Vec<FrameSlice> {
     let frames = outcome.simulated.in_order().zip(&outcome.summary.frames);
     let most = MAX_SLICES / outcome.summary.frames.len().max(1);
     outcome
@@ -127,7 +127,7 @@ fn frames(outcome: &FinishedRun) -> Vec<FrameSpan> {
         .frames
         .iter()
         .zip(frames)
-        .map(|(paced, (frame, row))| FrameSpan {
+        .map(|(paced, (frame, row))| FrameSlice {
             passes: frame.observed().map_or(Vec::new(), |observed| passes(observed, paced.start_s, most)),
             frame: u64::from(row.frame),
             start_ns: ns(paced.start_s),

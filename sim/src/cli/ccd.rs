@@ -8,7 +8,9 @@ use output::table::{Table, grouped};
 use output::terminal::{Progress, Terminal};
 use rayon::prelude::*;
 use serde::Serialize;
-use workloads::collision::{Answer, CaseFiles, Method, Object, Search, Verdict, candidates, detect_each};
+use workloads::collision::{
+    CaseFiles, CollisionMethod, Object, PairAnswer, PairSearch, PairVerdict, candidates, detect_each,
+};
 
 use super::{Failure, print, print_json};
 use crate::cli::args::ThreadArgs;
@@ -65,13 +67,13 @@ pub enum MethodArg {
 }
 
 impl CcdArgs {
-    fn search(&self) -> Search {
+    fn search(&self) -> PairSearch {
         let method = match self.method {
-            MethodArg::FragmentBox => Method::FragmentBox,
-            MethodArg::BoxBox => Method::BoxBox,
-            MethodArg::DepthOnly => Method::DepthOnly,
+            MethodArg::FragmentBox => CollisionMethod::FragmentBox,
+            MethodArg::BoxBox => CollisionMethod::BoxBox,
+            MethodArg::DepthOnly => CollisionMethod::DepthOnly,
         };
-        Search { resolution: self.resolution, bins: self.bins, method, zoom: !self.no_refinement }
+        PairSearch { resolution: self.resolution, bins: self.bins, method, zoom: !self.no_refinement }
     }
 }
 
@@ -120,7 +122,7 @@ enum CaseResult {
 }
 
 impl CaseResult {
-    fn new(case: &CaseFiles, objects: Result<Vec<Object>, String>, answers: &[Answer]) -> Self {
+    fn new(case: &CaseFiles, objects: Result<Vec<Object>, String>, answers: &[PairAnswer]) -> Self {
         let case_id = case.id.clone();
         match objects {
             Ok(objects) => Self::Found(Found::new(case_id, &objects, answers)),
@@ -151,7 +153,7 @@ fn objects(files: &CaseFiles) -> Result<Vec<Object>, String> {
 }
 
 impl Found {
-    fn new(case_id: String, objects: &[Object], answers: &[Answer]) -> Self {
+    fn new(case_id: String, objects: &[Object], answers: &[PairAnswer]) -> Self {
         Self {
             case_id,
             objects: objects.len(),
@@ -162,8 +164,8 @@ impl Found {
     }
 }
 
-fn pair(answer: &Answer) -> Option<Pair> {
-    let Verdict::Maybe { bounds, tiles, seen } = answer.verdict else { return None };
+fn pair(answer: &PairAnswer) -> Option<Pair> {
+    let PairVerdict::Maybe { bounds, tiles, seen } = answer.verdict else { return None };
     let pixels = (tiles > 0).then_some(tiles);
     Some(Pair { a: answer.a, b: answer.b, time: bounds.time, space: bounds.space, pixels, seen })
 }
@@ -194,7 +196,7 @@ pub(super) fn run(args: &CcdArgs, terminal: &Terminal) -> Result<(), Failure> {
 }
 
 /// Results of all cases, in order. The threads share the pairs of all cases.
-fn answered(cases: &[CaseFiles], search: &Search, progress: &Progress) -> Vec<CaseResult> {
+fn answered(cases: &[CaseFiles], search: &PairSearch, progress: &Progress) -> Vec<CaseResult> {
     let all: Vec<_> = cases.par_iter().map(objects).collect();
     let known: Vec<&[Object]> = all.iter().map(|case| case.as_deref().unwrap_or_default()).collect();
     let pairs = known.iter().map(|objects| candidates(objects).len() as u64).sum();

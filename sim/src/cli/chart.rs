@@ -7,10 +7,10 @@ use std::time::Instant;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::error::{ContextKind, ContextValue};
 use clap::{Arg, Args, Command};
-use experiments::reproduce::{self, Options, Paper};
+use experiments::reproduce::{self, Paper, ReproduceOptions};
 use experiments::stress::{StressChart, StressEffort, family_named};
-use experiments::study::tradeoff::{self, Index, Section};
-use experiments::study::{Done, Entry, Request, Study, StudyError};
+use experiments::study::tradeoff::{self, Index, StudySection};
+use experiments::study::{Done, Study, StudyEntry, StudyError, StudyRequest};
 use experiments::{ALL, CHARTS, all};
 use output::plot::PlotStyle;
 use output::terminal::{Progress, Terminal};
@@ -90,7 +90,7 @@ pub enum ChartArg {
     /// Every chart and the failure catalogue.
     All,
     /// One chart.
-    One(&'static Entry),
+    One(&'static StudyEntry),
 }
 
 /// Charts that had another name in 0.1.0: that name, and the name today. Errors suggest it.
@@ -162,7 +162,7 @@ pub(super) fn run(args: &ChartArgs, terminal: &Terminal) -> Result<(), Failure> 
     // What can be known to be wrong is reported before minutes of work.
     let out = Destination { folder: args.out.clone(), force: args.force };
     let mut dir = match args.chart {
-        ChartArg::All => out.open(all().map(Entry::claim).chain([tradeoff::claim()])),
+        ChartArg::All => out.open(all().map(StudyEntry::claim).chain([tradeoff::claim()])),
         ChartArg::One(chart) => out.open([chart.claim()]),
     }?;
     for scene in &args.scene {
@@ -170,10 +170,10 @@ pub(super) fn run(args: &ChartArgs, terminal: &Terminal) -> Result<(), Failure> 
     }
     let pool = args.threads.pool()?;
     let (plot_style, progress) = (args.plot_style.plot_style(), Progress::on(terminal, args.json));
-    let make = |study: &Entry, dir: &OutDir| {
+    let make = |study: &StudyEntry, dir: &OutDir| {
         let ChartArgs { quick, ref scene, seed, .. } = *args;
         let request =
-            Request { quick, scenes: scene, seed, dir, plot_style: &plot_style, progress: &progress };
+            StudyRequest { quick, scenes: scene, seed, dir, plot_style: &plot_style, progress: &progress };
         Ok(study.run(&request)?)
     };
     match args.chart {
@@ -187,7 +187,7 @@ pub(super) fn run(args: &ChartArgs, terminal: &Terminal) -> Result<(), Failure> 
 }
 
 /// Message about an option that goes with some charts alone.
-fn not_taken(option: &str, takes: fn(&Entry) -> bool) -> String {
+fn not_taken(option: &str, takes: fn(&StudyEntry) -> bool) -> String {
     let takers = CHARTS.iter().filter(|chart| takes(chart)).map(|chart| format!("`{}`", chart.name));
     let mut takers: Vec<String> = std::iter::once("`chart all`".to_owned()).chain(takers).collect();
     let last = takers.pop().unwrap_or_default();
@@ -208,7 +208,7 @@ fn run_all(
     args: &ChartArgs,
     dir: &mut OutDir,
     plot_style: &PlotStyle,
-    make: impl Fn(&Entry, &OutDir) -> Result<Done, Failure>,
+    make: impl Fn(&StudyEntry, &OutDir) -> Result<Done, Failure>,
 ) -> Result<(), Failure> {
     let (mut json, mut faults) = (Map::new(), Vec::new());
     let mut page = Index { command: command(args), ..Index::default() };
@@ -227,7 +227,8 @@ fn run_all(
         let files = dir.publish()?;
         let (name, about) = (study.name.to_owned(), study.about.to_owned());
         let took_s = started.elapsed().as_secs_f64();
-        page.sections.push(Section { name, about, text, took_s, ..Section::default() }.with_files(files));
+        page.sections
+            .push(StudySection { name, about, text, took_s, ..StudySection::default() }.with_files(files));
         page.tradeoff.points.extend(tradeoff);
         // After each, so that what there is can be looked at while the next one runs.
         page.write(dir, plot_style).map_err(|error| Failure { message: error.to_string(), code: 1 })?;
@@ -314,7 +315,7 @@ pub(super) fn reproduce(args: &ReproduceArgs, terminal: &Terminal) -> Result<(),
     let pool = args.threads.pool()?;
     let progress = Progress::on(terminal, args.json);
     let out = Destination { folder: args.out.clone(), force: args.force };
-    let options = Options {
+    let options = ReproduceOptions {
         quick: args.quick,
         rows: args.row.clone(),
         settings: args.settings.clone(),

@@ -4,7 +4,9 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use output::table::{Table, count_or_digits, digits, grouped, si};
-use run::compare::{Change, Comparison, FolderComparison, ImageComparison, RunComparison, compare, shown};
+use run::compare::{
+    Comparison, FolderComparison, ImageComparison, RunComparison, ValueChange, compare, shown,
+};
 
 use super::{Failure, may_hold_results, print, print_json};
 
@@ -78,7 +80,7 @@ fn runs_text(runs: &RunComparison, all: bool) -> String {
 }
 
 /// Table of the numbers that differ, or of all.
-fn changes_text(changes: &[Change], all: bool) -> String {
+fn changes_text(changes: &[ValueChange], all: bool) -> String {
     let differ = changes.iter().filter(|change| all || !change.is_equal());
     let mut table = Table::new(["", "A", "B", "B - A", "B / A"]);
     let mut group = "";

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use clap::Args;
 use output::table::{Table, counted, digits, grouped};
 use serde::Serialize;
-use workloads::job::{OptionSource, Request};
+use workloads::job::{JobRequest, OptionSource};
 use workloads::scene::{CameraUsed, SceneInfo, SettingsInfo};
 use workloads::visibility::{self, VisibilityScene};
 use workloads::{Alpha, FixedSamples, catalog};
@@ -38,7 +38,7 @@ pub(super) fn run(args: &InfoArgs) -> Result<(), Failure> {
     let overrides = args.view.overrides();
     let name = &*args.scene.to_string_lossy();
     if let Some(found) =
-        catalog::find(name, &OptionSource::default(), &Request { overrides: &overrides, seed: 1 })
+        catalog::find(name, &OptionSource::default(), &JobRequest { overrides: &overrides, seed: 1 })
     {
         let what = catalog::names().find(|(known, _)| *known == name).map_or("", |(_, what)| what);
         return print_workload(name, what, args.json, SettingsInfo::new(found?.settings()));

@@ -497,7 +497,7 @@ fn as_set(value: &Value) -> String {
 
 #[cfg(test)]
 mod tests {
-    use workloads::job::{OptionSource, Request};
+    use workloads::job::{JobRequest, OptionSource};
     use workloads::{Overrides, catalog};
 
     use super::*;
@@ -509,7 +509,7 @@ mod tests {
         let set = needed.filter(|(_, value)| *value != "none").chain([(name, value)]);
         let set = set.map(|(name, value)| (name.to_owned(), value.to_owned())).collect();
         let source = OptionSource { file: None, set };
-        let request = Request { overrides: &Overrides::default(), seed: 1 };
+        let request = JobRequest { overrides: &Overrides::default(), seed: 1 };
         catalog::find(workload, &source, &request).unwrap().map(drop).map_err(|error| error.to_string())
     }
 
@@ -576,7 +576,7 @@ mod tests {
         let others = others.map(|other| (other.choice, other.values[0]));
         let set = others.chain([(need.choice, choice), (need.option, value)]);
         let set = set.map(|(name, value)| (name.to_owned(), value.to_owned())).collect();
-        let request = Request { overrides: &Overrides::default(), seed: 1 };
+        let request = JobRequest { overrides: &Overrides::default(), seed: 1 };
         let made = catalog::find(options.workload, &OptionSource { file: None, set }, &request).unwrap();
         made.err().filter(workloads::LoadError::is_usage).unwrap().to_string()
     }

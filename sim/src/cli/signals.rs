@@ -33,10 +33,10 @@ pub(super) fn handle(terminal: Terminal, stop: Option<Stop>) {
         let mut is_terminated = false;
         for signal in signals.forever() {
             match &stop {
-                Some(stop) if signal == SIGUSR1 => stop.ask(signal),
+                Some(stop) if signal == SIGUSR1 => stop.request(signal),
                 Some(stop) if signal == SIGTERM && !is_terminated => {
                     is_terminated = true;
-                    stop.ask(signal);
+                    stop.request(signal);
                     let terminal = terminal.clone();
                     std::thread::spawn(move || {
                         std::thread::sleep(Duration::from_secs(GRACE_S));
@@ -83,7 +83,7 @@ pub(super) struct Stop {
 
 impl Stop {
     /// Whether it is time to end.
-    pub fn is_asked(&self) -> bool {
+    pub fn is_requested(&self) -> bool {
         self.signal.load(Ordering::Relaxed) != 0
     }
 
@@ -92,9 +92,9 @@ impl Stop {
         u8::try_from(128 + self.signal.load(Ordering::Relaxed)).unwrap_or(u8::MAX)
     }
 
-    /// Asks to end because of a signal. The exit code is that of the last one.
+    /// Requests the end because of a signal. The exit code is that of the last one.
     #[cfg(unix)]
-    pub fn ask(&self, signal: i32) {
+    pub fn request(&self, signal: i32) {
         self.signal.store(signal, Ordering::Relaxed);
     }
 }
@@ -108,8 +108,8 @@ mod tests {
     #[test]
     fn a_request_stays_and_gives_the_exit_code() {
         let stop = Stop::default();
-        assert!(!stop.is_asked());
-        stop.clone().ask(10);
-        assert!(stop.is_asked() && stop.code() == 138);
+        assert!(!stop.is_requested());
+        stop.clone().request(10);
+        assert!(stop.is_requested() && stop.code() == 138);
     }
 }

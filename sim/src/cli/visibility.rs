@@ -11,7 +11,7 @@ use pipeline::sampling::SampleSource;
 use pipeline::visibility::VisibleTriangle;
 use pipeline::{Features, SampleTable, Viewport};
 use run::fits_memory;
-use run::visibility::{Rates, find};
+use run::visibility::{SampleRates, find};
 use serde::Serialize;
 use warnings::{Code, Warning};
 use workloads::visibility::{self, CameraSpec, VisibilityScene};
@@ -74,7 +74,7 @@ struct Found {
     camera: Option<CameraSpec>,
     warnings: Vec<Warning>,
     #[serde(flatten)]
-    rates: Rates,
+    rates: SampleRates,
 }
 
 pub(super) fn run(args: &VisibilityArgs, terminal: &Terminal) -> Result<(), Failure> {

@@ -19,7 +19,7 @@ pub struct Search<'a> {
     common: Vec<Setting>,
     program: Option<&'a str>,
     folder: &'a Folder,
-    asked: Vec<Point>,
+    requested: Vec<Point>,
     known: HashSet<String>,
 }
 
@@ -32,7 +32,7 @@ pub struct Dimension {
     pub values: Option<usize>,
 }
 
-/// What is asked: a place on each axis.
+/// A request: a place on each axis.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Question {
@@ -78,7 +78,7 @@ impl<'a> Search<'a> {
         }
         let common = spec.base(quick);
         round_whole(&mut spec.axes, &common);
-        let search = Self { spec, common, program, folder, asked: Vec::new(), known: HashSet::new() };
+        let search = Self { spec, common, program, folder, requested: Vec::new(), known: HashSet::new() };
         folder.check(&search.plan(Vec::new()))?;
         Ok(search)
     }
@@ -112,7 +112,7 @@ impl<'a> Search<'a> {
             }
         };
         if self.known.insert(point.id.clone()) {
-            self.asked.push(point.clone());
+            self.requested.push(point.clone());
         }
         let answer = Answer { settings: point.settings, id: Some(point.id), ..Answer::default() };
         Ok(match result.outcome {
@@ -151,11 +151,11 @@ impl<'a> Search<'a> {
     pub fn finish(self) -> Result<usize, SweepError> {
         let mut points = if self.folder.holds_plan() { self.folder.plan()?.points } else { Vec::new() };
         let earlier: HashSet<String> = points.iter().map(|point| point.id.clone()).collect();
-        points.extend(self.asked.iter().filter(|point| !earlier.contains(&point.id)).cloned());
+        points.extend(self.requested.iter().filter(|point| !earlier.contains(&point.id)).cloned());
         if !points.is_empty() {
             self.folder.write_plan(&self.plan(points))?;
         }
-        Ok(self.asked.len())
+        Ok(self.requested.len())
     }
 
     fn plan(&self, points: Vec<Point>) -> SweepPlan {

@@ -15,7 +15,7 @@ pub enum Axis {
     Values {
         /// The setting.
         path: Arc<str>,
-        /// Its values.
+        /// Values of the axis.
         values: Vec<Text>,
     },
     /// Numbers from one to another.

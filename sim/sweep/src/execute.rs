@@ -27,13 +27,13 @@ pub(crate) struct PointResult {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub(crate) enum Outcome {
-    /// It was measured.
+    /// The point was measured.
     Measured(Box<Measured>),
-    /// It failed, for this reason.
+    /// The point failed, for this reason.
     Error(String),
-    /// It did not run, as a coarser timing level gave a reason.
+    /// The point did not run, as a coarser timing level gave a reason.
     ScreenedOut(String),
-    /// It did not run, as a coarser timing level cannot distinguish it from a design that did.
+    /// The point did not run, as a coarser timing level cannot distinguish it from a design that did.
     Undecided(String),
 }
 

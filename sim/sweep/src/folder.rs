@@ -59,7 +59,7 @@ impl Folder {
         Self { root: root.into() }
     }
 
-    /// Its path.
+    /// Path of the folder.
     pub fn path(&self) -> &Path {
         &self.root
     }
@@ -183,7 +183,7 @@ impl Folder {
         Ok(SweepPlan { name, settings, points, screen, program, idle })
     }
 
-    /// That the plan is of another build than `program`, in words; `None` if it is not, or there is no plan.
+    /// Whether the plan is of another build than `program`, in words; `None` if it is not, or there is no plan.
     ///
     /// # Errors
     /// If the plan cannot be read.
@@ -306,7 +306,7 @@ impl Folder {
 
 /// What is kept of a point.
 pub(crate) enum Stored {
-    /// Its result.
+    /// The result of the point.
     Whole(PointResult),
     /// A file that is not its result: what is wrong, and what to do.
     Damaged(String),

@@ -6,10 +6,10 @@
 //!
 //! - [`SweepSpec`]: the sweep file. [`SweepPlan`]: its points with ids, every value tried.
 //! - [`Folder`]: the plan and the results on disk, each file whole or absent.
-//! - [`Shard`]: which points a task runs. [`Work`]: runs those that are not finished.
+//! - [`Shard`]: which points a task runs. [`ShardWork`]: runs those that are not finished.
 //! - [`merge()`]: all results in one table, the same bytes for any number of shards and threads.
 //! - [`SweepReport`]: designs on the frontier of time and energy, and main effects.
-//! - [`Search`]: points that an optimizer asks for.
+//! - [`Search`]: points that an optimizer requests.
 //!
 //! A point has no state but its file, so a sweep may be stopped at any moment and continued anywhere.
 
@@ -30,7 +30,7 @@ mod shared;
 mod slurm;
 mod spec;
 
-pub use self::run::{Expected, Shard, Status, Work};
+pub use self::run::{ExpectedRuns, Shard, ShardWork, Status};
 pub use ask::{Answer, Dimension, Question, Search};
 pub use axis::Axis;
 pub use error::SweepError;
@@ -40,8 +40,8 @@ pub use merge::{RESULTS, merge};
 pub use plan::{Point, SweepPlan};
 pub use points::combinations;
 pub use report::{
-    Cost, Design, Effect, Failure, Interaction, Measure, NearBest, NoEffect, Pair, RatedDesign,
-    ReportOptions, Share, SweepReport, Winner,
+    Cost, Effect, Interaction, Measure, NearBest, NoEffect, Pair, PointFailure, RatedDesign, ReportOptions,
+    Share, SweepDesign, SweepReport, Winner,
 };
 pub use setting::{Setting, Text, is_option, misspelt, with};
 pub use slurm::{Scripts, SlurmArray, SlurmJob, submit};

@@ -279,7 +279,7 @@ mod tests {
 
     use super::*;
     use crate::setting::Setting;
-    use crate::{Shard, Work};
+    use crate::{Shard, ShardWork};
 
     fn plan() -> SweepPlan {
         let point = |samples: &str, tile: &str| Point {
@@ -305,7 +305,7 @@ mod tests {
         assert!(matches!(merge(&folder, false), Err(SweepError::Unfinished { missing: 3, points: 3, .. })));
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         for shard in shards {
-            let work = Work::new(&plan, &folder, Shard::parse(shard).unwrap(), false).unwrap();
+            let work = ShardWork::new(&plan, &folder, Shard::parse(shard).unwrap(), false).unwrap();
             pool.install(|| work.run(&Progress::new(true))).unwrap();
         }
         std::fs::read(merge(&folder, false).unwrap()).unwrap()
@@ -323,7 +323,7 @@ mod tests {
         let root = tempfile::tempdir().unwrap();
         let (folder, plan) = (Folder::at(root.path()), plan());
         folder.write_plan(&plan).unwrap();
-        let work = Work::new(&plan, &folder, Shard::parse("1/2").unwrap(), false).unwrap();
+        let work = ShardWork::new(&plan, &folder, Shard::parse("1/2").unwrap(), false).unwrap();
         work.run(&Progress::new(true)).unwrap();
         let table = InputTable::read(&merge(&folder, true).unwrap()).unwrap();
         let cells = |name: &str| table.texts(name).unwrap();
@@ -333,7 +333,7 @@ mod tests {
         let cycles = cells("cycles");
         assert!(cycles[1].is_empty() && cycles[0].parse::<u64>().unwrap() > 0, "{cycles:?}");
         assert_eq!(cells("gpu")[0], "reference");
-        let work = Work::new(&plan, &folder, Shard::default(), false).unwrap();
+        let work = ShardWork::new(&plan, &folder, Shard::default(), false).unwrap();
         let status = work.run(&Progress::new(true)).unwrap();
         assert_eq!((status.points, status.failed), (3, 1));
         let table = InputTable::read(&merge(&folder, false).unwrap()).unwrap();

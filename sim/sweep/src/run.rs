@@ -26,7 +26,7 @@ const PROBE_GROUPS: usize = 2;
 
 /// Number of runs to come, and their expected time on the threads of the current pool.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Expected {
+pub struct ExpectedRuns {
     /// Runs of the shard.
     pub runs: usize,
     /// Runs that are not finished.
@@ -35,7 +35,7 @@ pub struct Expected {
     pub host_s: Option<f64>,
 }
 
-impl Expected {
+impl ExpectedRuns {
     /// Line for the terminal.
     pub fn line(&self) -> String {
         let time = self
@@ -92,7 +92,7 @@ fn of_other_build(count: usize) -> Option<String> {
 }
 
 /// The points of a shard that are not finished.
-pub struct Work<'a> {
+pub struct ShardWork<'a> {
     plan: &'a SweepPlan,
     folder: &'a Folder,
     runs: usize,
@@ -105,7 +105,7 @@ pub struct Work<'a> {
     stop: &'a (dyn Fn() -> bool + Sync),
 }
 
-impl<'a> Work<'a> {
+impl<'a> ShardWork<'a> {
     /// Points of `plan` in `shard` without a whole result in `folder`; with `retry` also those that failed.
     ///
     /// # Errors
@@ -154,12 +154,16 @@ impl<'a> Work<'a> {
     }
 
     /// Expected time, from runs of the first and the middle pending point whose results are not kept.
-    pub fn probe(&self) -> Expected {
+    pub fn probe(&self) -> ExpectedRuns {
         let middle = self.pending.len() / 2;
         let probed = self.pending.iter().step_by(middle.max(1)).take(PROBE_POINTS);
         let costs: Costs = probed.map(|point| Costs::of(self.plan, point)).sum();
         let host_s = costs.expected_s(&self.pending) / rayon::current_num_threads() as f64;
-        Expected { runs: self.runs, pending: self.pending.len(), host_s: costs.is_known().then_some(host_s) }
+        ExpectedRuns {
+            runs: self.runs,
+            pending: self.pending.len(),
+            host_s: costs.is_known().then_some(host_s),
+        }
     }
 
     /// Runs all pending points on the current pool, those with equal drawings together. Each result is on
@@ -237,7 +241,7 @@ impl<'a> Work<'a> {
             // The first groups use one core where their points do not share.
             let cores = if finished == PROBE_GROUPS { rayon::current_num_threads() } else { 1 };
             let host_s = Some(left_s(finished) / cores as f64);
-            progress.note(&Expected { runs: self.runs, pending: count - finished, host_s }.line());
+            progress.note(&ExpectedRuns { runs: self.runs, pending: count - finished, host_s }.line());
         }
         others.par_iter().try_for_each(run)?;
         Ok((done.into_inner(), failed.into_inner()))

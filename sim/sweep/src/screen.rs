@@ -153,7 +153,7 @@ fn kept<'a>(designs: &[Design<'a>], calibrated: usize) -> Vec<&'a Point> {
 pub(crate) struct Screened<'a> {
     /// Number of points that have to run.
     pub kept: usize,
-    /// Those of them that have not.
+    /// Points that have to run and have not.
     pub pending: Vec<&'a Point>,
     /// Others, with the reason.
     pub dropped: Vec<(&'a Point, Outcome)>,
@@ -238,7 +238,7 @@ mod tests {
     use output::terminal::Progress;
 
     use super::*;
-    use crate::{Shard, Status, Work};
+    use crate::{Shard, ShardWork, Status};
 
     fn points(count: usize) -> Vec<Point> {
         let setting = |number: usize| crate::Setting::new("gpu.core_hz", number.to_string());
@@ -330,7 +330,7 @@ mod tests {
         let into = Folder::at(folder.path().join("out"));
         into.write_plan(&plan).unwrap();
         let started = cpu_time::ProcessTime::now();
-        let work = Work::new(&plan, &into, Shard::default(), false).unwrap();
+        let work = ShardWork::new(&plan, &into, Shard::default(), false).unwrap();
         let status = work.run(&Progress::new(true)).unwrap();
         let host_s = started.elapsed().as_secs_f64();
         let last = plan.of_level(plan.screen.len().max(1) - 1);

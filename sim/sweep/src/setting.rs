@@ -84,9 +84,9 @@ const WORKLOAD: &str = "workload";
 pub(crate) enum Stage {
     /// Frames are drawn: packets and counts.
     Drawing,
-    /// They are timed.
+    /// Packets are timed.
     Timing,
-    /// They get energies.
+    /// Timelines get energies.
     Power,
 }
 

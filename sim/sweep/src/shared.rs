@@ -48,7 +48,7 @@ fn by_settings<'a>(points: &[&'a Point], counts: fn(&Setting) -> bool) -> Vec<Ve
 }
 
 impl<'a> Group<'a> {
-    /// Its points.
+    /// Points of the group.
     pub fn points(&self) -> impl Iterator<Item = &'a Point> {
         self.timings.iter().flatten().copied()
     }

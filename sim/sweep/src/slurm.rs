@@ -6,7 +6,7 @@ use std::process::Command;
 use output::dir::OutDir;
 use output::table::shell_line;
 
-use crate::{Expected, Folder, SweepError};
+use crate::{ExpectedRuns, Folder, SweepError};
 
 /// Names of the scripts: the array, and the job that merges.
 const SCRIPTS: [&str; 2] = ["array.sh", "merge.sh"];
@@ -37,7 +37,7 @@ pub struct SlurmArray {
 impl SlurmArray {
     /// Tasks of `threads` each for runs that are expected to take `expected` on `host_threads`. `tasks` is
     /// their number if it is given; otherwise a task takes about ten minutes.
-    pub fn new(expected: &Expected, host_threads: usize, threads: usize, tasks: Option<usize>) -> Self {
+    pub fn new(expected: &ExpectedRuns, host_threads: usize, threads: usize, tasks: Option<usize>) -> Self {
         let total_s = expected.host_s.unwrap_or(0.0) * host_threads as f64 / threads as f64;
         let packed = libm::ceil(total_s / TASK_S) as usize;
         let tasks = tasks.unwrap_or(packed).clamp(1, MAX_TASKS.min(expected.pending.max(1)));
@@ -162,7 +162,7 @@ mod tests {
     use super::*;
 
     fn array(pending: usize, host_s: f64, tasks: Option<usize>) -> SlurmArray {
-        let expected = Expected { runs: pending, pending, host_s: Some(host_s) };
+        let expected = ExpectedRuns { runs: pending, pending, host_s: Some(host_s) };
         SlurmArray::new(&expected, 8, 2, tasks)
     }
 

@@ -22,7 +22,7 @@ pub(crate) struct ByDraw<T> {
 }
 
 impl<T: Clone + Default> ByDraw<T> {
-    /// That of draw number `draw` of pass number `pass`.
+    /// The thing of draw number `draw` of pass number `pass`.
     pub fn of(passes: &mut Vec<Self>, pass: u32, draw: u32) -> &mut T {
         let (pass, at) = (pass as usize, draw as usize);
         if passes.len() <= pass {

@@ -193,11 +193,11 @@ fn share(whole: u64, fraction: u64) -> u64 {
 /// Why a unit (or one of its servers) does not work.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Reason {
-    /// It has no work left in this frame, or no requests.
+    /// No work is left in this frame, or no requests.
     Idle,
-    /// It waits for input from this unit.
+    /// Input from this unit is missing.
     Starved(Unit),
-    /// It waits for this unit to accept its output or to answer.
+    /// This unit does not accept output, or does not answer yet.
     Blocked(Unit),
 }
 

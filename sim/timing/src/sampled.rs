@@ -23,9 +23,9 @@ const MIN_REPRESENTATIVES: usize = 2 * MIN_PER_STRATUM;
 /// Units with neighbouring signatures.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Stratum {
-    /// Its units, sorted by signature.
+    /// Units of the stratum, sorted by signature.
     pub members: Vec<usize>,
-    /// Its representatives, in the same order.
+    /// Representatives of the stratum, in the same order.
     pub chosen: Vec<usize>,
 }
 

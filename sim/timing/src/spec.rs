@@ -495,7 +495,7 @@ impl DataUnit {
         }
     }
 
-    /// Its port at the L2.
+    /// Port of the unit at the L2.
     pub const fn port(self) -> usize {
         match self {
             Self::Texture => 2,
@@ -503,7 +503,7 @@ impl DataUnit {
         }
     }
 
-    /// Its events that may have a rate.
+    /// Events of the unit that may have a rate.
     pub const fn events(self) -> [Event; DATA_EVENTS] {
         match self {
             Self::Texture => [Event::TextureFetches, Event::TextureLines, Event::TextureMisses],

@@ -1,4 +1,4 @@
-//! Warnings: results are there, but a method is weak for this input, or something that a file asks for was ignored.
+//! Warnings: results are there, but a method is weak for this input, or something that a file requests was ignored.
 //!
 //! A [`Warning`] has a [`Code`] that never changes its meaning, and a message for people. All codes are
 //! declared in one place, with what they mean and the section of the book that explains them.
@@ -36,7 +36,7 @@ pub enum Section {
 }
 
 impl Section {
-    /// Its heading in the book.
+    /// Heading of the section in the book.
     pub const fn heading(self) -> &'static str {
         match self {
             Self::Simulator => "From the simulator",
@@ -97,7 +97,7 @@ codes! {
     IdleAboveBusy = "idle-above-busy" in Simulator,
     /// Power exceeds the recorder's range.
     ClippedSamples = "clipped-samples" in Simulator,
-    /// The recorder lost packets, as `--packet-loss` asked.
+    /// The recorder lost packets, as `--packet-loss` requests.
     PacketsLost = "packets-lost" in Simulator,
     /// A tenth or more of the triangles in view reach behind the camera.
     BehindCamera = "behind-camera" in Simulator,
@@ -241,7 +241,7 @@ codes! {
     EmissiveIgnored = "emissive-ignored" in Scene,
     /// A material has an occlusion map.
     OcclusionMapIgnored = "occlusion-map-ignored" in Scene,
-    /// A texture asks for no filtering under magnification.
+    /// A texture requests no filtering under magnification.
     TextureFilterIgnored = "texture-filter-ignored" in Scene,
     /// A PLY file names a texture in a comment.
     TextureIgnored = "texture-ignored" in Scene,
@@ -304,10 +304,10 @@ impl PartialEq<&str> for Code {
 }
 
 /// A run has entered a regime its methods are known to be bad at, or has gone on without something its input
-/// asks for.
+/// requests.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 pub struct Warning {
-    /// Its subject.
+    /// Subject of the warning.
     pub code: Code,
     /// The event, the number of things it concerns, and its effect on the results; one line.
     pub message: String,

@@ -3,7 +3,7 @@
 use crate::case::Case;
 use std::error::Error;
 use traces::energy::{FrameEnergy, PowerIntegral, TOLERANCE_S, score, true_frames};
-use traces::frames::{FinderMethod, Flags, Marks, Options, find_with};
+use traces::frames::{FinderMethod, FinderOptions, Flags, Marks, find_with};
 
 /// Relative errors of energy.
 #[derive(Clone, Copy, Default)]
@@ -28,7 +28,7 @@ pub struct Outcome {
 impl Outcome {
     pub fn new(case: &Case, starts_s: Vec<f64>, method: FinderMethod) -> Result<Self, Box<dyn Error>> {
         let marks = Marks { starts_s, window: case.window, end_s: case.trace.end_s() };
-        let found = find_with(&case.trace, &marks, &Options { method, without: None })?;
+        let found = find_with(&case.trace, &marks, &FinderOptions { method, without: None })?;
         let frames = PowerIntegral::new(&case.trace).frames(&found);
         let score = score(&frames, &case.truth, TOLERANCE_S);
         let (wrong, wrong_flagged, right_flagged) = wrong(case, &frames);

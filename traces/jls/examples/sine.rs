@@ -2,7 +2,7 @@
 //!
 //! `cargo run -p jls --example sine -- sine.jls`, then open the file in the Joulescope UI.
 
-use jls::{Reader, SignalName, Timestamp, Writer};
+use jls::{JlsWriter, Reader, SignalName, Timestamp};
 use std::error::Error;
 use std::fs::File;
 use std::path::PathBuf;
@@ -14,7 +14,7 @@ const START_S: f64 = 1_735_689_600.0;
 
 fn write(path: &PathBuf) -> Result<(), Box<dyn Error>> {
     let signals = [SignalName { name: "current", unit: "A" }];
-    let mut writer = Writer::new(File::create(path)?, "sine", RATE_HZ, signals, "{}")?;
+    let mut writer = JlsWriter::new(File::create(path)?, "sine", RATE_HZ, signals, "{}")?;
     for second in 0..SECONDS {
         let phase = |sample: usize| (second * RATE_HZ as usize + sample) as f32 * 1e-3;
         let current_a: Vec<f32> = (0..RATE_HZ as usize).map(|sample| 1.0 + phase(sample).sin()).collect();

@@ -154,7 +154,7 @@ const REPAIR: &str = "the Joulescope UI or pyjls repairs a copy of it by opening
 /// The header of a chunk.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ChunkHeader {
-    /// Its place.
+    /// Place of the chunk in the file.
     pub at: u64,
     /// The place of the next chunk of its list.
     pub next: Option<u64>,

@@ -142,7 +142,7 @@ fn track<W: Write + Seek>(
 /// A signal of fixed rate.
 #[derive(Clone, Debug, Default)]
 pub struct Signal {
-    /// Its number in the file.
+    /// Number of the signal in the file.
     pub number: u16,
     /// The number of its source.
     pub source: u16,
@@ -166,32 +166,32 @@ impl Signal {
 
 /// An instrument that recorded signals.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Source {
+pub struct Instrument {
     /// Name, vendor, model, version and serial number, as far as they are there.
     texts: Vec<String>,
 }
 
-impl Source {
+impl Instrument {
     fn text(&self, index: usize) -> &str {
         self.texts.get(index).map_or("", String::as_str)
     }
 
-    /// Its name in the file.
+    /// Name of the source in the file.
     pub fn name(&self) -> &str {
         self.text(0)
     }
 
-    /// Its vendor.
+    /// Vendor of the source.
     pub fn vendor(&self) -> &str {
         self.text(1)
     }
 
-    /// Its model.
+    /// Model of the source.
     pub fn model(&self) -> &str {
         self.text(2)
     }
 
-    /// Its serial number.
+    /// Serial number of the source.
     pub fn serial_number(&self) -> &str {
         self.text(4)
     }
@@ -202,7 +202,7 @@ impl Source {
 pub(crate) struct Definitions {
     pub signals: Vec<Signal>,
     /// By their numbers.
-    pub sources: BTreeMap<u16, Source>,
+    pub sources: BTreeMap<u16, Instrument>,
 }
 
 /// The texts of a definition, each ended by a zero and 0x1f.
@@ -218,7 +218,7 @@ impl Definitions {
         let mut sources = BTreeMap::new();
         each(file, SOURCE, |head, payload| {
             if head.meta < MAX_NUMBER {
-                sources.insert(head.meta, Source { texts: texts(payload, SOURCE_TEXTS) });
+                sources.insert(head.meta, Instrument { texts: texts(payload, SOURCE_TEXTS) });
             }
         })?;
         let mut signals = BTreeMap::<u16, Signal>::new();

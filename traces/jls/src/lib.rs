@@ -1,7 +1,7 @@
 //! JLS version 2, the recordings of Joulescope instruments: reading and writing, in pieces, in files of any
 //! length.
 //!
-//! - [`Writer`] writes signals of one fixed rate in f32, with the summaries (mean, standard deviation,
+//! - [`JlsWriter`] writes signals of one fixed rate in f32, with the summaries (mean, standard deviation,
 //!   lowest, highest) that let viewers zoom, the times of first and last sample, and a JSON text of your own.
 //! - [`Reader`] lists the signals of a file; a [`SampleReader`] reads the samples of one of them, in any of
 //!   the common sample types, from any sample on.
@@ -44,9 +44,9 @@ mod write;
 use std::io;
 use thiserror::Error;
 
-pub use definitions::{Signal, SignalName, Source};
+pub use definitions::{Instrument, Signal, SignalName};
 pub use read::{Reader, SampleReader};
-pub use write::Writer;
+pub use write::JlsWriter;
 
 /// First bytes of every file.
 pub(crate) const IDENTIFICATION: &[u8; 16] = b"jlsfmt\r\n \n \x1a  \xb2\x1c";

@@ -219,7 +219,7 @@ impl Times {
 ///
 /// Memory does not grow with the samples: about 4 MiB, and 25 KiB a signal for each level of summaries (five
 /// at 1e9).
-pub struct Writer<W, const N: usize> {
+pub struct JlsWriter<W, const N: usize> {
     chunks: ChunkWriter<W>,
     signals: [SignalWriter; N],
     times: [Times; N],
@@ -227,7 +227,7 @@ pub struct Writer<W, const N: usize> {
     samples: u64,
 }
 
-impl<W: Write + Seek, const N: usize> Writer<W, N> {
+impl<W: Write + Seek, const N: usize> JlsWriter<W, N> {
     /// Begins a recording in an empty file: the name of the instrument, samples per second, the signals
     /// (numbered from 1), and a JSON text of any content.
     ///

@@ -5,7 +5,7 @@ mod sample;
 mod spec;
 
 pub use resample::Resampled;
-pub use sample::{SampleError, Sampled};
+pub use sample::{SampleError, SampledTrace};
 pub use spec::{DeviceError, DeviceSpec, MAX_PACKET_SAMPLES, Peaks, RATES_HZ};
 
 /// A validated [`DeviceSpec`], ready to sample.
@@ -32,7 +32,7 @@ impl Device {
         })
     }
 
-    /// Its specification.
+    /// Specification of the device.
     pub fn spec(&self) -> &DeviceSpec {
         &self.spec
     }
@@ -131,7 +131,7 @@ impl Device {
     /// With `V = V' + a`, `I = I' + b`, `|a| <= e_V`, `|b| <= e_I`, the power is off by at most
     /// `|V'| e_I + |I'| e_V + e_V e_I`; `e` is half a code plus the f32 rounding of the stored value. The last term
     /// covers the f64 arithmetic of means, rail and integral.
-    pub fn quantization_energy_bound_j(&self, sampled: &Sampled) -> Option<f64> {
+    pub fn quantization_energy_bound_j(&self, sampled: &SampledTrace) -> Option<f64> {
         if !self.is_noise_free()
             || !self.is_true()
             || sampled.clipped_currents > 0

@@ -260,14 +260,14 @@ impl TraceWriter for Pass<'_> {
 mod tests {
     use super::*;
     use crate::curve::Curve;
-    use crate::device::{DeviceSpec, Sampled};
+    use crate::device::{DeviceSpec, SampledTrace};
     use crate::io::SplitTrace;
     use crate::trace::Metadata;
     use crate::trace::Trace;
     use proptest::prelude::*;
 
     /// The whole trace at once, as if its power were drawn from the device's rail.
-    fn resample(device: &Device, trace: &Trace) -> Result<Sampled, SampleError> {
+    fn resample(device: &Device, trace: &Trace) -> Result<SampledTrace, SampleError> {
         let edges_s = (0..=trace.samples()).map(|index| trace.time_s(index)).collect();
         let curve = Curve::recorded(edges_s, trace.powers_w().collect())?;
         let mut sampled = device.sample(&curve, trace.start_s(), curve.end_s())?;

@@ -21,9 +21,9 @@ pub enum SampleError {
         "cannot sample {start_s} s to {end_s} s: the power curve covers {curve_start_s} s to {curve_end_s} s"
     )]
     Span {
-        /// Asked start, s.
+        /// Requested start, s.
         start_s: f64,
-        /// Asked end, s.
+        /// Requested end, s.
         end_s: f64,
         /// Start of the curve, s.
         curve_start_s: f64,
@@ -35,9 +35,9 @@ pub enum SampleError {
         "{start_s} s to {end_s} s is shorter than one sample at {rate_hz} Hz: raise the rate or sample longer"
     )]
     TooShort {
-        /// Asked start, s.
+        /// Requested start, s.
         start_s: f64,
-        /// Asked end, s.
+        /// Requested end, s.
         end_s: f64,
         /// The device's rate, Hz.
         rate_hz: f64,
@@ -48,9 +48,9 @@ pub enum SampleError {
          lower the rate or sample a part"
     )]
     TooLong {
-        /// Asked start, s.
+        /// Requested start, s.
         start_s: f64,
-        /// Asked end, s.
+        /// Requested end, s.
         end_s: f64,
         /// The device's rate, Hz.
         rate_hz: f64,
@@ -86,7 +86,7 @@ impl From<SampleError> for WriteError {
 
 /// A synthetic trace, and how many of its samples were beyond the device's range.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Sampled {
+pub struct SampledTrace {
     /// The trace.
     pub trace: Trace,
     /// Samples whose current was clipped to the range; above 0 is worth a warning.
@@ -112,7 +112,7 @@ impl Device {
     ///
     /// # Errors
     /// [`SampleError`]: span outside the curve or too short, rail overloaded.
-    pub fn sample(&self, curve: &Curve, start_s: f64, end_s: f64) -> Result<Sampled, SampleError> {
+    pub fn sample(&self, curve: &Curve, start_s: f64, end_s: f64) -> Result<SampledTrace, SampleError> {
         let count = self.periods([start_s, end_s], [curve.start_s(), curve.end_s()], MAX_SAMPLES)?;
         let mut means_w = curve.sample_means_w(start_s, self.spec.rate_hz, count);
         if let Some(mut low_pass) = self.low_pass() {
@@ -121,7 +121,7 @@ impl Device {
         let channels = self.convert(0, &means_w, start_s)?;
         let metadata = self.metadata(Metadata::default());
         let trace = Trace::new(channels.voltage_v, channels.current_a, self.spec.rate_hz, start_s, metadata)?;
-        Ok(Sampled {
+        Ok(SampledTrace {
             trace: trace.without(self.lost(count)),
             clipped_currents: channels.clipped_currents,
             clipped_voltages: channels.clipped_voltages,

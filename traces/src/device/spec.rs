@@ -15,7 +15,7 @@ pub struct DeviceError {
     pub device: String,
     /// The field.
     pub field: &'static str,
-    /// Its value.
+    /// Value of the field.
     pub value: f64,
     /// The valid range.
     pub must: &'static str,

@@ -67,9 +67,9 @@ pub enum FrameTableError {
     /// An extra column has another number of cells than there are frames.
     #[error("column `{name}` has {cells} cells for {frames} frames: give one per frame")]
     Column {
-        /// Its name.
+        /// Name of the column.
         name: &'static str,
-        /// Its cells.
+        /// Cells of the column.
         cells: usize,
         /// Measured frames.
         frames: usize,

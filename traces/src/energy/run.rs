@@ -41,7 +41,7 @@ pub struct RunEnergy {
 /// A part of every frame, from its begin to that of the next pass, or to the end of the frame.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FramePart {
-    /// Its name.
+    /// Name of the pass.
     pub name: String,
     /// When it begins, s after the start of the frame.
     pub begin_s: f64,
@@ -56,7 +56,7 @@ pub enum FramePartError {
         /// The name.
         name: String,
     },
-    /// It begins in no frame.
+    /// The pass begins in no frame.
     #[error(
         "pass {name} begins {begin_ms} ms after the start of its frame, but no frame is longer than {longest_ms:.3} ms; let it \
          begin before that"

@@ -26,21 +26,21 @@ use serde::Serialize;
 /// # Errors
 /// [`MarkError`] if the marks do not fit the trace.
 pub fn find(trace: &Trace, marks: &Marks) -> Result<Found, MarkError> {
-    find_with(trace, marks, &Options::default())
+    find_with(trace, marks, &FinderOptions::default())
 }
 
 /// How to search.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Options {
+pub struct FinderOptions {
     /// Which method.
     pub method: FinderMethod,
     /// A step that is left out, to measure what it is worth.
-    pub without: Option<Step>,
+    pub without: Option<FinderStep>,
 }
 
 /// A step of tracking that can be left out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Step {
+pub enum FinderStep {
     /// Frames of both sides of a clock step aligned.
     ClockSteps,
     /// Starts that split frames taken out.
@@ -55,7 +55,7 @@ pub enum Step {
     PhaseSlips,
 }
 
-impl Step {
+impl FinderStep {
     /// All of them, with their names.
     pub const ALL: [(&'static str, Self); 6] = [
         ("clock-steps", Self::ClockSteps),
@@ -71,7 +71,7 @@ impl Step {
 ///
 /// # Errors
 /// [`MarkError`] if the marks do not fit the trace.
-pub fn find_with(trace: &Trace, marks: &Marks, options: &Options) -> Result<Found, MarkError> {
+pub fn find_with(trace: &Trace, marks: &Marks, options: &FinderOptions) -> Result<Found, MarkError> {
     match options.method {
         FinderMethod::SumOfSquares | FinderMethod::Normalized => find_matched(trace, marks, options.method),
         FinderMethod::Tracking => find_tracked(trace, marks, options.without),
@@ -117,7 +117,7 @@ const MAX_TRACKED_SAMPLES: usize = 1 << 24;
 const MIN_COVERAGE_GAIN: f64 = 0.02;
 
 /// [`FinderMethod::Auto`] and [`FinderMethod::Consensus`].
-fn find_auto(trace: &Trace, marks: &Marks, options: &Options) -> Result<Found, MarkError> {
+fn find_auto(trace: &Trace, marks: &Marks, options: &FinderOptions) -> Result<Found, MarkError> {
     let without = options.without;
     let squares = find_matched(trace, marks, FinderMethod::SumOfSquares)?;
     let samples = marks.place(trace)?.samples;
@@ -147,7 +147,7 @@ fn find_auto(trace: &Trace, marks: &Marks, options: &Options) -> Result<Found, M
         return Ok(tracked);
     }
     let search =
-        |part: &Trace, marks: &Marks, method| find_with(part, marks, &Options { method, without }).ok();
+        |part: &Trace, marks: &Marks, method| find_with(part, marks, &FinderOptions { method, without }).ok();
     Ok(more_agreed(trace, marks, [tracked, squares], search))
 }
 
@@ -155,8 +155,8 @@ fn find_auto(trace: &Trace, marks: &Marks, options: &Options) -> Result<Found, M
 const MAX_SEGMENTED_SAMPLES: usize = 1 << 20;
 
 /// [`FinderMethod::Segments`]: segmentation up to the end mark, with the results of the other methods as proposals.
-fn find_segments(trace: &Trace, marks: &Marks, options: &Options) -> Result<Found, MarkError> {
-    let auto = find_auto(trace, marks, &Options { method: FinderMethod::Auto, ..*options })?;
+fn find_segments(trace: &Trace, marks: &Marks, options: &FinderOptions) -> Result<Found, MarkError> {
+    let auto = find_auto(trace, marks, &FinderOptions { method: FinderMethod::Auto, ..*options })?;
     let placement = marks.place(trace)?;
     if placement.samples < COARSE_WINDOW_SAMPLES || trace.samples() > MAX_SEGMENTED_SAMPLES {
         return Ok(auto);
@@ -286,7 +286,8 @@ pub fn propose(trace: &Trace) -> Option<Proposal> {
         let window = default_window(0.0, part.rate_hz());
         let marks = Marks::one(mark_s, window, part.end_s());
         let found =
-            find_with(&part, &marks, &Options { method: FinderMethod::SumOfSquares, without: None }).ok()?;
+            find_with(&part, &marks, &FinderOptions { method: FinderMethod::SumOfSquares, without: None })
+                .ok()?;
         let (regularity, similar_starts) = (found.threshold.regularity, found.starts.len());
         Some(Proposal { mark_s, regularity, similar_starts, tried })
     });
@@ -361,15 +362,15 @@ fn correlation(a: &[f64], b: &[f64]) -> f64 {
 }
 
 /// Finds the sequence of starts with the most evidence.
-fn find_tracked(trace: &Trace, marks: &Marks, without: Option<Step>) -> Result<Found, MarkError> {
-    let with = |step: Step| without != Some(step);
+fn find_tracked(trace: &Trace, marks: &Marks, without: Option<FinderStep>) -> Result<Found, MarkError> {
+    let with = |step: FinderStep| without != Some(step);
     let placement = marks.place(trace)?;
     let power: Vec<f64> = trace.powers_w().collect();
-    let mut tracked = track(&power, &placement, with(Step::ClockSteps)).starts;
-    if !with(Step::PhaseSlips) {
+    let mut tracked = track(&power, &placement, with(FinderStep::ClockSteps)).starts;
+    if !with(FinderStep::PhaseSlips) {
         tracked.iter_mut().for_each(|start| start.confidence_factor = 1.0);
     }
-    if with(Step::SplitFrames) {
+    if with(FinderStep::SplitFrames) {
         tracked = without_false_starts(&power, tracked, &placement);
     }
     let offsets: Vec<usize> = tracked.iter().map(|start| start.offset).collect();
@@ -378,7 +379,7 @@ fn find_tracked(trace: &Trace, marks: &Marks, without: Option<Step>) -> Result<F
     let fixed: Vec<bool> = marked.iter().map(Option::is_some).collect();
     let anchor = placement.marks.first().map_or(0.0, |mark| mark.anchor);
     let positions = register(&power, &offsets, &fixed, libm::round(anchor) as usize, placement.samples);
-    let positions = match with(Step::StartRefinement) {
+    let positions = match with(FinderStep::StartRefinement) {
         true => refine_starts(&power, positions, &fixed, anchor, placement.samples),
         false => positions,
     };
@@ -429,7 +430,7 @@ fn in_phase(
     starts: &[Start],
     fixed: &[bool],
     placement: &Placement,
-    without: Option<Step>,
+    without: Option<FinderStep>,
 ) -> (Vec<f64>, Vec<f64>) {
     let anchor = placement.marks.first().map_or(0.0, |mark| mark.anchor);
     let width = placement.samples;
@@ -437,14 +438,14 @@ fn in_phase(
         |positions: &[f64]| -> Vec<f64> { positions.iter().map(|position| position + anchor).collect() };
     let first_mark = fixed.iter().position(|fixed| *fixed);
     let (positions, in_phase) = match first_mark
-        .filter(|_| without != Some(Step::DisplayTicks))
+        .filter(|_| without != Some(FinderStep::DisplayTicks))
         .and_then(|mark| snap_to_ticks(&positions, mark, width))
     {
         // What begins on a tick is in the phase of the mark, whatever happened on the way.
         Some(Snapped { positions, off_tick }) => {
             (positions, off_tick.iter().map(|off| if *off { SUSPECT_CONFIDENCE } else { 1.0 }).collect())
         }
-        None if without == Some(Step::IdleGaps) => {
+        None if without == Some(FinderStep::IdleGaps) => {
             (positions, starts.iter().map(|start| start.confidence_factor).collect())
         }
         None => {
@@ -455,7 +456,7 @@ fn in_phase(
             (positions, product(starts.iter().map(|start| start.confidence_factor), factors))
         }
     };
-    if without == Some(Step::IdleGaps) {
+    if without == Some(FinderStep::IdleGaps) {
         return (positions, in_phase);
     }
     let with_gap = spread_from_unmarked(
@@ -492,7 +493,7 @@ mod tests {
             window: Window { pre_s: 1e-3, post_s: 4e-3 },
             end_s: trace.end_s(),
         };
-        find_auto(&trace, &marks, &Options::default()).unwrap()
+        find_auto(&trace, &marks, &FinderOptions::default()).unwrap()
     }
 
     fn noise(sample: usize) -> f32 {

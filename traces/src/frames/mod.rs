@@ -23,7 +23,7 @@ mod track;
 use crate::stats::upper_median;
 use core::fmt;
 use core::str::FromStr;
-pub use find::{Options, Proposal, Step, find, find_with, marked_only, propose};
+pub use find::{FinderOptions, FinderStep, Proposal, find, find_with, marked_only, propose};
 use marks::Placed;
 pub(crate) use marks::Placement;
 pub use marks::{MarkError, Marks, Window, default_window};
@@ -55,7 +55,7 @@ pub struct FrameSpan {
     pub end_s: f64,
     /// The lower confidence of its two ends (of its start for the last frame).
     pub confidence: f64,
-    /// Its flags.
+    /// Flags of the frame.
     pub flags: Flags,
 }
 
@@ -102,7 +102,7 @@ const SLIPPED_CONFIDENCE: f64 = 0.6 * MIN_CONFIDENCE;
 pub enum Flag {
     /// The frame whose start was marked.
     Marked,
-    /// It ends at the end mark, not at a found start.
+    /// The frame ends at the end mark, not at a found start.
     Last,
     /// More than 1.5 times the median duration: perhaps two frames with a start missed between them.
     Long,
@@ -114,10 +114,10 @@ pub enum Flag {
     Merged,
     /// Less than 1 / 1.6 as long as the frames around it: it may be part of one.
     Split,
-    /// Its length deviates from the even period of its neighbours: one of its ends may be misplaced.
+    /// The frame's length deviates from the even period of its neighbours: one of its ends may be misplaced.
     IrregularLength,
-    /// It has fewer than 16 samples: its ends, known to half a sample at best, may be off by a thirtieth of
-    /// it and more.
+    /// The frame has fewer than 16 samples: its ends, known to half a sample at best, may be off by a
+    /// thirtieth of it and more.
     Coarse,
 }
 

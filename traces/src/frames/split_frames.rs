@@ -34,9 +34,9 @@ const MARGIN_STARTS: usize = 2;
 
 /// The assessment of each start.
 pub(super) struct SplitFrames {
-    /// Its confidence factor.
+    /// Confidence factor of each.
     pub confidence_factors: Vec<f64>,
-    /// Whether it splits a frame.
+    /// Whether each splits a frame.
     pub splits_frame: Vec<bool>,
 }
 

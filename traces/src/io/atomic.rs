@@ -127,7 +127,7 @@ impl Unfinished {
         list().add(remove)
     }
 
-    /// It is finished and stays.
+    /// Ends the write: the file is finished and stays.
     pub fn finish(self) {
         list().removers.remove(&self.number);
     }

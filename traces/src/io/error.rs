@@ -163,7 +163,7 @@ pub enum ReadError {
         path: PathBuf,
         /// The column.
         column: String,
-        /// Its type.
+        /// Type of the column.
         found: String,
         /// The types that can be read.
         must: &'static str,
@@ -209,7 +209,7 @@ pub enum ReadError {
         path: PathBuf,
         /// The row.
         row: u64,
-        /// Its time, s.
+        /// Time of the row, s.
         time_s: f64,
         /// The time of the row before, s.
         before_s: f64,
@@ -224,7 +224,7 @@ pub enum ReadError {
         path: PathBuf,
         /// The row.
         row: u64,
-        /// Its time, s.
+        /// Time of the row, s.
         time_s: f64,
         /// How far it is off, in sample periods.
         off_periods: f64,
@@ -348,7 +348,7 @@ pub enum WriteError {
     Mark {
         /// Which mark, from 0.
         index: usize,
-        /// Its time, s.
+        /// Time of the mark, s.
         time_s: f64,
     },
     /// The trace to be written cannot be made.

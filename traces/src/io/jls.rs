@@ -43,7 +43,7 @@ const MAX_RATE_DEVIATION: f64 = 1e-3;
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub struct Writer<W> {
-    file: ::jls::Writer<W, { SIGNALS.len() }>,
+    file: ::jls::JlsWriter<W, { SIGNALS.len() }>,
     rate_hz: f64,
     start_s: f64,
 }
@@ -76,7 +76,7 @@ impl<W: Write + Seek> Writer<W> {
         if description.len() >= MAX_PAYLOAD_BYTES as usize {
             return Err(WriteError::Encode("the description is longer than 64 MiB: leave out marks".into()));
         }
-        let file = ::jls::Writer::new(out, &metadata.device, whole_hz, SIGNALS, &description);
+        let file = ::jls::JlsWriter::new(out, &metadata.device, whole_hz, SIGNALS, &description);
         let mut writer = Self { file: file.map_err(failed)?, rate_hz, start_s };
         writer.stamp()?;
         Ok(writer)

@@ -42,7 +42,7 @@ pub enum RepairKind {
 /// A repair.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Repair {
-    /// Its kind.
+    /// Kind of the repair.
     pub code: RepairKind,
     /// The first row (from 1, as in the file; after sorting, in the sorted order).
     pub row: u64,

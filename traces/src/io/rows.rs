@@ -350,7 +350,7 @@ const SUM_WORDS: [&str; 5] = ["total", "sum", "all", "overall", "combined"];
 /// A rail among several that seems to be the sum of the others.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SumOfRails {
-    /// Its name; empty if its columns carry none.
+    /// Name of the rail; empty if its columns carry none.
     pub rail: String,
     /// The others, in order.
     pub others: Vec<String>,

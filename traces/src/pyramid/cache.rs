@@ -1,7 +1,7 @@
 //! The cache file of a pyramid: a header, checksums of groups of entries, and the entries, level by level.
 
-use super::{BLOCK, ENTRY_BYTES, Entry, FANOUT, Pyramid, Store};
-use crate::clock::Clock;
+use super::{BLOCK, ENTRY_BYTES, Entry, FANOUT, PowerPyramid, Store};
+use crate::clock::SampleClock;
 use crate::io::{ReadOptions, WriteError, atomic};
 use crc32c::crc32c;
 use std::fs;
@@ -53,7 +53,7 @@ fn bytes(entries: &[Entry]) -> Vec<u8> {
 }
 
 /// Writes the levels of the trace with this stamp.
-pub(super) fn keep(pyramid: &Pyramid, path: &Path, stamp: u64) -> Result<(), WriteError> {
+pub(super) fn keep(pyramid: &PowerPyramid, path: &Path, stamp: u64) -> Result<(), WriteError> {
     let Store::Memory(levels) = &pyramid.store else { return Ok(()) };
     let groups = || levels.iter().flat_map(|level| level.chunks(GROUP_ENTRIES as usize));
     let sums: Vec<u8> = groups().flat_map(|group| crc32c(&bytes(group)).to_le_bytes()).collect();
@@ -75,7 +75,7 @@ fn seal(head: &[u8], sums: &[u8]) -> u32 {
 /// The cache file found beside a trace.
 pub(super) enum Cached {
     /// The pyramid of the trace, whole as far as can be seen without its entries.
-    Whole(Pyramid),
+    Whole(PowerPyramid),
     /// Nothing, or the pyramid of another trace or version.
     Other,
     /// A pyramid that was cut off or changed.
@@ -102,9 +102,9 @@ pub(super) fn kept(path: &Path, stamp: u64) -> Cached {
         return Cached::Other;
     }
     let sums = sums.as_chunks().0.iter().map(|sum| u32::from_le_bytes(*sum)).collect();
-    let clock = Clock { start_s, rate_hz, samples: Some(samples) };
+    let clock = SampleClock { start_s, rate_hz, samples: Some(samples) };
     let store = Store::File(Kept { path: path.to_owned(), sizes, sums });
-    Cached::Whole(Pyramid { clock, samples, store, was_damaged: false })
+    Cached::Whole(PowerPyramid { clock, samples, store, was_damaged: false })
 }
 
 /// Entries of each level and the bytes of the checksums, which come next; `None` if the file is not as long
@@ -164,7 +164,7 @@ mod tests {
         let path = folder.path().join("t.parquet");
         crate::io::parquet::save(&trace, &path).unwrap();
         let options = ReadOptions::default();
-        let made = Pyramid::of_file(&path, &options).unwrap();
+        let made = PowerPyramid::of_file(&path, &options).unwrap();
         let (kept_at, whole) = (pyramid_path(&path), fs::read(pyramid_path(&path)).unwrap());
         for at in (0..whole.len()).step_by(997).chain([8, 63, 64, whole.len() - 1]) {
             let mut bytes = whole.clone();
@@ -184,8 +184,8 @@ mod tests {
         }
         for length in [0, 63, 64, whole.len() - 1] {
             fs::write(&kept_at, &whole[..length]).unwrap();
-            let again = Pyramid::of_file(&path, &options).unwrap();
-            assert!(again.was_damaged() && !Pyramid::of_file(&path, &options).unwrap().was_damaged());
+            let again = PowerPyramid::of_file(&path, &options).unwrap();
+            assert!(again.was_damaged() && !PowerPyramid::of_file(&path, &options).unwrap().was_damaged());
         }
     }
 }

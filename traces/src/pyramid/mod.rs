@@ -7,7 +7,7 @@ mod cache;
 use core::ops::Range;
 use std::path::{Path, PathBuf};
 
-use crate::clock::{Clock, clock};
+use crate::clock::{SampleClock, clock};
 use crate::io::{ReadError, ReadOptions, RowBatch, Rows, Stamps, rate_of_steps_hz, read};
 use crate::pyramid::cache::Cached;
 use crate::trace::Trace;
@@ -26,9 +26,9 @@ const EDGE_SAMPLES: f64 = 1e-6;
 /// A segment of time and the powers in it, W.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Column {
-    /// Its begin, s.
+    /// Begin of the column, s.
     pub from_s: f64,
-    /// Its end, s.
+    /// End of the column, s.
     pub to_s: f64,
     /// The lowest power of any sample in it.
     pub low_w: f32,
@@ -47,8 +47,8 @@ struct Entry {
 
 /// Blocks of a trace's power.
 #[derive(Debug)]
-pub struct Pyramid {
-    clock: Clock,
+pub struct PowerPyramid {
+    clock: SampleClock,
     samples: u64,
     store: Store,
     /// Whether what was kept was damaged, so that this was made in its place.
@@ -83,7 +83,7 @@ pub fn pyramid_path(trace: &Path) -> PathBuf {
     name.into()
 }
 
-impl Pyramid {
+impl PowerPyramid {
     /// The pyramid kept beside a file if it is that of the file as it is now and is read as `options` say;
     /// else made anew and kept, if the folder lets itself be written to.
     ///
@@ -140,11 +140,12 @@ impl Pyramid {
     /// The pyramid of a trace in memory.
     pub fn of_trace(trace: &Trace) -> Self {
         let samples = trace.samples() as u64;
-        let clock = Clock { start_s: trace.start_s(), rate_hz: trace.rate_hz(), samples: Some(samples) };
+        let clock =
+            SampleClock { start_s: trace.start_s(), rate_hz: trace.rate_hz(), samples: Some(samples) };
         Self::of_blocks(clock, samples, blocks(trace.voltage_v(), trace.current_a()).collect())
     }
 
-    fn of_blocks(clock: Clock, samples: u64, base: Vec<Entry>) -> Self {
+    fn of_blocks(clock: SampleClock, samples: u64, base: Vec<Entry>) -> Self {
         let mut levels = vec![base];
         while levels[levels.len() - 1].len() > FANOUT {
             levels.push(levels[levels.len() - 1].chunks(FANOUT).map(Entry::of_entries).collect());
@@ -164,7 +165,7 @@ impl Pyramid {
 
     /// About `columns` columns from one time to another, snapped outwards to blocks, which are of at least 64
     /// samples. Lowest and highest are those of all samples within (as f32), none missed. `None` where what
-    /// was kept cannot be read or is damaged: it is to be made [anew](Pyramid::anew).
+    /// was kept cannot be read or is damaged: it is to be made [anew](PowerPyramid::anew).
     pub fn columns(&self, from_s: f64, to_s: f64, columns: usize) -> Option<Vec<Column>> {
         let (from, to) = self.places(from_s, to_s);
         let wanted = (to.saturating_sub(from) / columns.max(1) as u64).max(1);
@@ -250,8 +251,8 @@ impl Entry {
     }
 }
 
-impl Pyramid {
-    /// As [`Pyramid::columns`] of a file, but where columns are narrower than blocks, from its samples: those
+impl PowerPyramid {
+    /// As [`PowerPyramid::columns`] of a file, but where columns are narrower than blocks, from its samples: those
     /// before are passed over, which takes texts as long as reading them.
     ///
     /// # Errors
@@ -280,7 +281,7 @@ impl Pyramid {
         Ok(Some(self.of_samples(range.start, [&voltage_v, &current_a], columns)))
     }
 
-    /// As [`Pyramid::columns_of_file`], of a trace in memory.
+    /// As [`PowerPyramid::columns_of_file`], of a trace in memory.
     pub fn columns_of_trace(&self, trace: &Trace, span_s: [f64; 2], columns: usize) -> Option<Vec<Column>> {
         let Some(range) = self.few(span_s, columns) else {
             return self.columns(span_s[0], span_s[1], columns);
@@ -312,7 +313,7 @@ const PIECE_ROWS: usize = 1 << 20;
 /// Largest difference between a step of two stamps and a period, in periods.
 const MAX_STEP_OFFSET: f64 = 0.5;
 
-fn of_file(path: &Path, options: &ReadOptions) -> Result<Pyramid, ReadError> {
+fn of_file(path: &Path, options: &ReadOptions) -> Result<PowerPyramid, ReadError> {
     let mut clock = clock(path, options)?;
     let mut rows = Rows::open(path, options)?;
     // Texts do not say how many rows they have: the rate is then that of the first rows until all are read.
@@ -340,7 +341,7 @@ fn of_file(path: &Path, options: &ReadOptions) -> Result<Pyramid, ReadError> {
     rows.description.check_rows(path, samples)?;
     rows.description.check_end(path)?;
     clock.rate_hz = steps.and_then(|steps| steps.rate_hz(samples)).unwrap_or(clock.rate_hz);
-    Ok(Pyramid::of_blocks(clock, samples, base))
+    Ok(PowerPyramid::of_blocks(clock, samples, base))
 }
 
 fn blocks<'a>(voltage_v: &'a [f32], current_a: &'a [f32]) -> impl Iterator<Item = Entry> + use<'a> {
@@ -416,8 +417,8 @@ mod tests {
         let path = folder.path().join("t.parquet");
         parquet::save(&trace, &path).unwrap();
         let options = ReadOptions::default();
-        let made = Pyramid::of_file(&path, &options).unwrap();
-        let kept = Pyramid::of_file(&path, &options).unwrap();
+        let made = PowerPyramid::of_file(&path, &options).unwrap();
+        let kept = PowerPyramid::of_file(&path, &options).unwrap();
         assert!(matches!((&made.store, &kept.store), (Store::Memory(_), Store::File(_))));
         let bytes = fs::metadata(pyramid_path(&path)).unwrap().len() as f64;
         assert!(bytes < 0.03 * 8.0 * samples as f64, "{bytes}");
@@ -435,7 +436,7 @@ mod tests {
             }
         }
         write(&path, b"changed").unwrap();
-        assert!(Pyramid::of_file(&path, &options).is_err());
+        assert!(PowerPyramid::of_file(&path, &options).is_err());
     }
 
     #[test]
@@ -450,7 +451,7 @@ mod tests {
                 "t.csv" => csv::save(&trace, &path).unwrap(),
                 _ => parquet::save(&trace, &path).unwrap(),
             }
-            let pyramid = Pyramid::of_file(&path, &options).unwrap();
+            let pyramid = PowerPyramid::of_file(&path, &options).unwrap();
             let look =
                 |columns| pyramid.columns_of_file(&path, &options, [3.0, 3.1], columns).unwrap().unwrap();
             let each: Vec<f32> = look(1000).iter().map(|column| column.mean_w).collect();
@@ -488,14 +489,14 @@ mod tests {
         ] as [(fn(u32) -> f64, &str); 2]
         {
             write(&path, text((0..3000).map(|row| (at(row), 1.0)))).unwrap();
-            let message = Pyramid::build(&path, &plain).unwrap_err().to_string();
+            let message = PowerPyramid::build(&path, &plain).unwrap_err().to_string();
             assert!(message.contains(says), "{message}");
             let (built, trace) =
-                (Pyramid::build(&path, &repair).unwrap(), read(&path, &repair).unwrap().trace);
+                (PowerPyramid::build(&path, &repair).unwrap(), read(&path, &repair).unwrap().trace);
             assert_eq!((built.start_s(), built.end_s()), (trace.start_s(), trace.end_s()));
         }
         write(&path, text((0..3000).map(|row| (even(row), 1.0)))).unwrap();
-        assert_eq!(Pyramid::build(&path, &plain).unwrap().end_s(), 3.0);
+        assert_eq!(PowerPyramid::build(&path, &plain).unwrap().end_s(), 3.0);
     }
 
     #[test]
@@ -505,7 +506,8 @@ mod tests {
         let time = |row: u32| (f64::from(row) * 1e6 / 44_117.65).round() / 1e6;
         write(&path, text((0..20_000).map(|row| (time(row), 1.0)))).unwrap();
         let options = ReadOptions::default();
-        let (built, trace) = (Pyramid::build(&path, &options).unwrap(), read(&path, &options).unwrap().trace);
+        let (built, trace) =
+            (PowerPyramid::build(&path, &options).unwrap(), read(&path, &options).unwrap().trace);
         assert_eq!(built.end_s(), trace.end_s());
     }
 
@@ -516,7 +518,7 @@ mod tests {
         let trace = Trace::new(vec![1.0; 3000], vec![1.0; 3000], 1000.0, 0.0, Default::default()).unwrap();
         parquet::save(&trace, &path).unwrap();
         let nan = ReadOptions { fixed_voltage_v: Some(f64::NAN), ..ReadOptions::default() };
-        let message = Pyramid::build(&path, &nan).unwrap_err().to_string();
+        let message = PowerPyramid::build(&path, &nan).unwrap_err().to_string();
         assert!(message.contains("row 1: voltage_V is NaN"), "{message}");
     }
 }

@@ -6,7 +6,7 @@
 //! A seed makes another device of the same kind: most quantities are drawn anew with it.
 
 use super::layers::{Dice, Drawn, Layers, on_demand, pipelined};
-use super::{RecorderSpec, Scene};
+use super::{RecorderSpec, SynthScene};
 use crate::CurveError;
 use crate::energy::TrueFrame;
 use core::f64::consts::TAU;
@@ -14,7 +14,7 @@ use core::f64::consts::TAU;
 /// A kind of device, with the recorder that is used on it.
 #[derive(Clone, Copy, Debug)]
 pub struct HeldOutDevice {
-    /// Its name.
+    /// Name of the device.
     pub name: &'static str,
     /// What it does, in a line.
     pub about: &'static str,
@@ -56,13 +56,13 @@ impl HeldOutDevice {
     ///
     /// # Errors
     /// [`CurveError`] if power would not be finite or be negative.
-    pub fn scene(&self, frames: usize, seed: u64) -> Result<Scene, CurveError> {
+    pub fn scene(&self, frames: usize, seed: u64) -> Result<SynthScene, CurveError> {
         let drawn = (self.make)(frames, seed);
         let curve = drawn.layers.curve(drawn.until_s)?;
         let ends_s = drawn.starts_s.iter().skip(1).copied().chain([drawn.end_s]);
         let frame = |(&a_s, b_s): (&f64, f64)| TrueFrame { start_s: a_s, energy_j: curve.energy_j(a_s, b_s) };
         let truth = drawn.starts_s.iter().zip(ends_s).map(frame).collect();
-        Ok(Scene { truth, curve, end_s: drawn.end_s })
+        Ok(SynthScene { truth, curve, end_s: drawn.end_s })
     }
 
     /// How it is recorded.

@@ -25,7 +25,7 @@ use thiserror::Error;
 /// The properties that make a recording easy or hard.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Scenario {
-    /// Its name.
+    /// Name of the scenario.
     pub name: &'static str,
     /// Frames wait for a tick of this rate, Hz; `None` lets them run on.
     pub sync_hz: Option<f64>,
@@ -77,7 +77,7 @@ pub const SCENARIOS: [Scenario; 8] = [
 
 /// A curve, and the frames in it.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Scene {
+pub struct SynthScene {
     /// Power over time.
     pub curve: Curve,
     /// The frames, in order; each reaches to the next one's start, the last to `end_s`.
@@ -91,7 +91,7 @@ impl Scenario {
     ///
     /// # Errors
     /// [`CurveError`] if a number of the scenario is not finite or so large that power would be negative.
-    pub fn scene(&self, frames: usize, seed: u64) -> Result<Scene, CurveError> {
+    pub fn scene(&self, frames: usize, seed: u64) -> Result<SynthScene, CurveError> {
         let mut maker = Maker::new(*self, seed)?;
         maker.idle_around()?;
         let starts_s: Vec<f64> = (0..frames).map(|frame| maker.frame(frame)).collect::<Result<_, _>>()?;
@@ -101,7 +101,7 @@ impl Scenario {
         let ends_s = starts_s.iter().skip(1).copied().chain([end_s]);
         let frame = |(&a_s, b_s): (&f64, f64)| TrueFrame { start_s: a_s, energy_j: curve.energy_j(a_s, b_s) };
         let truth = starts_s.iter().zip(ends_s).map(frame).collect();
-        Ok(Scene { truth, curve, end_s })
+        Ok(SynthScene { truth, curve, end_s })
     }
 }
 
@@ -141,7 +141,7 @@ pub enum SynthError {
     Sample(#[from] SampleError),
 }
 
-impl Scene {
+impl SynthScene {
     /// The trace of all of it, idle before and after included.
     ///
     /// # Errors

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use traces::io::perfetto::{
-    BusySlice, CounterTrack, FrameSpan, MAX_POINTS, PassSpan, PerfettoTimeline, UnitTrack, write,
+    BusySlice, CounterTrack, FrameSlice, MAX_POINTS, PassSpan, PerfettoTimeline, UnitTrack, write,
 };
 
 /// A decoded field: a varint, eight bytes, or bytes that may be a message.
@@ -149,7 +149,7 @@ fn timeline(points: Vec<(u64, f64)>) -> PerfettoTimeline<'static> {
         end_ns: start_ns + 60,
         parts: Vec::new(),
     };
-    let span = |frame, start_ns| FrameSpan {
+    let span = |frame, start_ns| FrameSlice {
         frame,
         start_ns,
         busy_end_ns: start_ns + 60,

@@ -12,8 +12,8 @@ use glam::{DVec3, Vec3};
 use pipeline::sampling::SampleSpec;
 use pipeline::{Cull, Gpu, LensShape, PipelineSpec, SampleTable, Viewport};
 use workloads::accumulation::SharedSamples;
-use workloads::multiview::{Layout, Rig, Target};
-use workloads::soft_shadows::{AreaLight, LightSpec, Method, ShadowMap};
+use workloads::multiview::{Layout, MultiviewRig, ViewTarget};
+use workloads::soft_shadows::{AreaLight, LightSpec, ShadowMap, ShadowMethod};
 use workloads::{Overrides, glossy, soft_shadows};
 
 const RUNS: usize = 3;
@@ -47,7 +47,7 @@ fn views(spec: &PipelineSpec) {
     let scene = workloads::load("default").unwrap().with_overrides(&size).unwrap();
     let frame = scene.frame(18).unwrap();
     let draws = frame.draws(&scene).unwrap();
-    let to = Target {
+    let to = ViewTarget {
         viewport: Viewport::new(160, 90).unwrap(),
         spec,
         background: scene.background(),
@@ -55,7 +55,7 @@ fn views(spec: &PipelineSpec) {
     };
     let focus = frame.camera.lens().unwrap().focus();
     for layout in [Layout::stereo(0.28, 0.11), Layout::line(7, 0.5, 0.11)] {
-        let rig = Rig::new(&frame.camera, focus, &layout, 8, 1).unwrap();
+        let rig = MultiviewRig::new(&frame.camera, focus, &layout, 8, 1).unwrap();
         let passes = [layout.views as usize, rig.samples() as usize];
         let one =
             time(|| _ = rig.one_pass(&draws, &to, &mut Gpu::without_packets(to.spec).unwrap()).unwrap());
@@ -74,7 +74,8 @@ fn gloss(spec: &PipelineSpec) {
     let draws: Vec<_> =
         frame.draws(&scene).unwrap().into_iter().map(|draw| draw.culling(Cull::None)).collect();
     let eye = (DVec3::new(0.3, 2.0, 3.0), DVec3::new(-0.1, -1.0, -0.8));
-    let map = glossy::Map::new(&glossy::receiver(), eye, glossy::Effect::Reflection, 0.25, 128).unwrap();
+    let map =
+        glossy::Map::new(&glossy::receiver(), eye, glossy::GlossyEffect::Reflection, 0.25, 128).unwrap();
     for count in [16, 64] {
         let table = SampleTable::new(&SampleSpec::default(), count, 1).unwrap();
         let set = SharedSamples::interleaved(&SampleSpec::default(), count, 1).unwrap();
@@ -98,7 +99,7 @@ fn shadows(spec: &PipelineSpec) {
     let disk = SampleSpec { lens: LensShape::Disk, ..SampleSpec::default() };
     for count in [16, 64] {
         let set = SharedSamples::interleaved(&disk, count, 1).unwrap();
-        let [one, many] = [Method::OnePass, Method::Accumulation].map(|method| {
+        let [one, many] = [ShadowMethod::OnePass, ShadowMethod::Accumulation].map(|method| {
             time(|| {
                 let gpu = &mut Gpu::without_packets(spec).unwrap();
                 _ = ShadowMap::new(&light, &draws, 256, &set, method, gpu).unwrap();

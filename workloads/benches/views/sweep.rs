@@ -3,7 +3,7 @@
 use activity::Event;
 use pipeline::depth::DepthSpec;
 use pipeline::{CacheSpec, Features, Gpu, MemorySpec, PipelineSpec, Replacement, Shading, Viewport};
-use workloads::multiview::{Layout, Rig, Target};
+use workloads::multiview::{Layout, MultiviewRig, ViewTarget};
 use workloads::{Overrides, Scene};
 
 /// The hardware of `sim/run/gpus/reference.ron`.
@@ -78,10 +78,10 @@ impl Point {
     fn increase(&self, scene: &Scene, focus: f64, layout: &Layout, hardware: &PipelineSpec) -> f64 {
         let frame = scene.frame(18).unwrap();
         let draws = frame.draws(scene).unwrap();
-        let rig = Rig::new(&frame.camera, focus as f32, layout, self.samples, 1).unwrap();
+        let rig = MultiviewRig::new(&frame.camera, focus as f32, layout, self.samples, 1).unwrap();
         let spec = PipelineSpec { shading_cache: self.cache, ..*hardware };
         let viewport = Viewport::new(self.size.0, self.size.1).unwrap();
-        let to = Target { viewport, spec: &spec, background: scene.background(), places: &[] };
+        let to = ViewTarget { viewport, spec: &spec, background: scene.background(), places: &[] };
         let middle = (layout.views as usize - 1) / 2;
         let all = rig.one_pass(&draws, &to, &mut Gpu::without_packets(to.spec).unwrap()).unwrap().counts
             [Event::PixelInvocations];

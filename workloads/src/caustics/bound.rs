@@ -11,7 +11,7 @@ use super::Beam;
 /// How a beam is rasterized.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Method {
+pub enum BeamMethod {
     /// A moving triangle, with the exact times at each pixel (thesis, Paper VI).
     #[default]
     Moving,
@@ -32,7 +32,7 @@ pub enum Method {
 /// A bounding volume of a beam or a part of it: triangles of consistent orientation, normals outward.
 pub(super) type BoundingVolume = Vec<[DVec3; 3]>;
 
-impl Method {
+impl BeamMethod {
     /// All methods that lose no light; the paper's comes first.
     pub const ALL: [Self; 4] = [Self::Moving, Self::Refined, Self::Hull, Self::Prism];
 
@@ -288,7 +288,7 @@ mod tests {
     /// beam is covered.
     #[test]
     fn bounding_volumes_contain_their_beam() {
-        for method in [Method::Refined, Method::Hull, Method::Prism] {
+        for method in [BeamMethod::Refined, BeamMethod::Hull, BeamMethod::Prism] {
             let (mut random, mut volume) = (Uniform::new(11), BoundingVolume::new());
             for round in 0..1200 {
                 let beam = match round % 6 {
@@ -310,7 +310,7 @@ mod tests {
         let mut random = Uniform::new(2);
         for _ in 0..50 {
             let beam = warped(&mut random, 0.0);
-            for method in [Method::Refined, Method::Hull, Method::Prism] {
+            for method in [BeamMethod::Refined, BeamMethod::Hull, BeamMethod::Prism] {
                 let mut volume = BoundingVolume::new();
                 method.bounding_volumes(&Lane::default(), &beam, &mut volume);
                 let volume: f64 = volume.iter().map(|[a, b, c]| a.cross(*b).dot(*c) / 6.0).sum();
@@ -348,7 +348,7 @@ mod tests {
                     assert!(count <= 1, "{round}: {count} of {volume:?}");
                     covered += count;
                 }
-                Method::Refined.bounding_volumes(&Lane::default(), &beam, &mut volume);
+                BeamMethod::Refined.bounding_volumes(&Lane::default(), &beam, &mut volume);
                 let once = volume.len();
                 let mut twice = volume.clone();
                 twice.extend(&volume);

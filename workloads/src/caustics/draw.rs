@@ -10,12 +10,12 @@ use rayon::prelude::*;
 
 use super::bound::BoundingVolume;
 use super::light::{PixelInBeam, Seen};
-use super::{Beam, Eye, Light, Method};
+use super::{Beam, BeamMethod, DrawnLight, Eye};
 
 /// An image of light with its work; pixels row by row from the top left.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Picture {
-    /// Light of each pixel, in the unit of the requested [`Light`]; empty if none was requested.
+pub struct LightPicture {
+    /// Light of each pixel, in the unit of the requested [`DrawnLight`]; empty if none was requested.
     pub light: Vec<f64>,
     /// Shader executions of each pixel.
     pub runs: Vec<u32>,
@@ -43,7 +43,7 @@ pub(super) struct Covered {
 /// Rows of tiles per parallel task.
 const BAND_TILES: u32 = 2;
 
-impl Picture {
+impl LightPicture {
     /// Total shader executions.
     pub fn total_runs(&self) -> u64 {
         self.runs.iter().map(|runs| u64::from(*runs)).sum()
@@ -62,7 +62,7 @@ impl Picture {
 
 /// Draws `beams` by `method`. With `light`, sums the light in the order of the beams; otherwise counts
 /// executions only.
-pub fn draw(beams: &[Beam], eye: &Eye, method: Method, light: Option<Light>) -> Picture {
+pub fn draw(beams: &[Beam], eye: &Eye, method: BeamMethod, light: Option<DrawnLight>) -> LightPicture {
     draw_with_work(beams, eye, method, light, false).0
 }
 
@@ -70,10 +70,10 @@ pub fn draw(beams: &[Beam], eye: &Eye, method: Method, light: Option<Light>) -> 
 pub(super) fn draw_with_work(
     beams: &[Beam],
     eye: &Eye,
-    method: Method,
-    light: Option<Light>,
+    method: BeamMethod,
+    light: Option<DrawnLight>,
     log: bool,
-) -> (Picture, Vec<Covered>) {
+) -> (LightPicture, Vec<Covered>) {
     let seen: Vec<Option<Seen>> = beams.par_iter().map(|beam| eye.see(beam)).collect();
     let rows = eye.viewport().height().div_ceil(TILE_PX);
     let bands: Vec<Band> = (0..rows.div_ceil(BAND_TILES))
@@ -86,7 +86,8 @@ pub(super) fn draw_with_work(
         })
         .collect();
     let skipped = seen.iter().filter(|seen| seen.is_none()).count() as u64;
-    let mut all = Picture { light: Vec::new(), runs: Vec::new(), useful: 0, tiles: 0, tests: 0, skipped };
+    let mut all =
+        LightPicture { light: Vec::new(), runs: Vec::new(), useful: 0, tiles: 0, tests: 0, skipped };
     let mut work = Vec::new();
     for band in bands {
         all.light.extend(band.light);
@@ -118,7 +119,14 @@ impl Band {
         Self { rows, light, runs: vec![0; pixels], useful: 0, tiles: 0, tests: 0, work: Vec::new() }
     }
 
-    fn draw(&mut self, seen: &[Option<Seen>], eye: &Eye, method: Method, light: Option<Light>, log: bool) {
+    fn draw(
+        &mut self,
+        seen: &[Option<Seen>],
+        eye: &Eye,
+        method: BeamMethod,
+        light: Option<DrawnLight>,
+        log: bool,
+    ) {
         let mut cover = Cover::new(eye, method, self.rows[0]..self.rows[1]);
         let columns = eye.viewport().width().div_ceil(TILE_PX);
         for (number, seen) in (0..).zip(seen) {
@@ -134,7 +142,7 @@ impl Band {
         (self.tiles, self.tests) = (cover.tiles, cover.tests);
     }
 
-    fn shade(&mut self, eye: &Eye, seen: &Seen, light: Option<Light>, first: [u32; 2], pixels: u64) {
+    fn shade(&mut self, eye: &Eye, seen: &Seen, light: Option<DrawnLight>, first: [u32; 2], pixels: u64) {
         let mut unshaded = pixels;
         while unshaded != 0 {
             let bit = unshaded.trailing_zeros();
@@ -159,7 +167,7 @@ pub(super) const TILE_PX: u32 = 8;
 /// Coverage masks of rows of tiles, filled by one beam at a time.
 pub(super) struct Cover<'a> {
     eye: &'a Eye,
-    method: Method,
+    method: BeamMethod,
     grid: Grid,
     /// First row of pixels.
     first_row: u32,
@@ -180,7 +188,7 @@ pub(super) fn times(eye: &Eye, seen: &Seen, at: [f64; 2]) -> [TimeIntervals; 2] 
 
 impl<'a> Cover<'a> {
     /// Masks for these rows of tiles of the image.
-    pub fn new(eye: &'a Eye, method: Method, rows: Range<u32>) -> Self {
+    pub fn new(eye: &'a Eye, method: BeamMethod, rows: Range<u32>) -> Self {
         let [half_width, half_height] = eye.viewport().half_px().map(f64::from);
         let (side, first_row) = (f64::from(TILE_PX), rows.start * TILE_PX);
         let columns = eye.viewport().width().div_ceil(TILE_PX);
@@ -204,7 +212,7 @@ impl<'a> Cover<'a> {
     /// Passes every tile that the method covers to `each`, as its first pixel and a mask of 8 by 8 pixels.
     pub fn each(&mut self, seen: &Seen, mut each: impl FnMut([u32; 2], u64)) {
         match self.method {
-            Method::Moving => self.moving(seen),
+            BeamMethod::Moving => self.moving(seen),
             method => {
                 let mut volume = std::mem::take(&mut self.volume);
                 method.bounding_volumes(&Lane::default(), &seen.image, &mut volume);
@@ -378,7 +386,7 @@ mod tests {
         let mut random = Uniform::new(21);
         for round in 0..400 {
             let Some(seen) = eye.see(&warped(&mut random, [0.0, 0.3, 0.8, 1.5][round % 4])) else { continue };
-            let mut cover = Cover::new(&eye, Method::Moving, 0..12);
+            let mut cover = Cover::new(&eye, BeamMethod::Moving, 0..12);
             let mut tiles = Vec::new();
             let [open, close] = [seen.image.open, seen.image.close].map(|end| end.map(|p| p.to_array()));
             let triangle = MovingTriangle::new(open, close).unwrap();

@@ -209,21 +209,21 @@ pub fn transmission(cos_in: f64, cos_out: f64, ratio: f64) -> f64 {
 #[cfg(test)]
 pub(in crate::caustics) mod tests {
     use pipeline::Lane;
+    use pipeline::random::SplitMix;
 
     use super::*;
     use crate::caustics::Hit;
 
-    /// Counter-based uniform numbers.
-    pub struct Uniform(u64);
+    /// Uniform numbers.
+    pub struct Uniform(SplitMix);
 
     impl Uniform {
         pub fn new(seed: u64) -> Self {
-            Self(mix(seed ^ 0xCA05_71C5))
+            Self(SplitMix::new(mix(seed ^ 0xCA05_71C5)))
         }
 
         pub fn within(&mut self, low: f64, high: f64) -> f64 {
-            self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-            low + (high - low) * unit(mix(self.0))
+            low + (high - low) * self.0.next_unit()
         }
 
         /// A random position in a beam.

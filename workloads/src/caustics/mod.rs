@@ -8,11 +8,11 @@
 //!
 //! - [`Beam`]: the light volume of a generator triangle; [`Beam::inside`]: when a point lies in it.
 //! - [`generator`]: beams of an ocean, of a water surface with one wave, of a mirror ring, of a ball lens.
-//! - [`Method`]: the moving triangle, and bounding volumes: the prism of Ernst et al. (2005), the refined
+//! - [`BeamMethod`]: the moving triangle, and bounding volumes: the prism of Ernst et al. (2005), the refined
 //!   bound of Liktor and Dachsbacher (2011), the convex hull.
 //! - [`Squares`]: the same light by photons, as a reference for images.
-//! - [`Eye`], [`draw()`]: light and shader executions of every pixel, in the volume ([`Light::Volume`]) or on
-//!   the floor ([`Light::Floor`]).
+//! - [`Eye`], [`draw()`]: light and shader executions of every pixel, in the volume ([`DrawnLight::Volume`]) or on
+//!   the floor ([`DrawnLight::Floor`]).
 //! - [`Coverage`], [`accuracy_warnings`]: a method compared with brute force, and warnings about inaccurate beams.
 //! - [`job()`]: the workload.
 //!
@@ -33,16 +33,16 @@ use warnings::{Code, Warning};
 
 use crate::error::LoadError;
 use crate::job::{
-    Drawn, Draws, Fact, Flag, Flags, Job, JobError, JobOptions, OptionSource, Request, facts, must_hold,
+    Drawn, Draws, Fact, Flag, Flags, Job, JobError, JobOptions, JobRequest, OptionSource, facts, must_hold,
 };
 use crate::scene::Settings;
 pub use beam::{Beam, Hit};
-pub use bound::Method;
+pub use bound::BeamMethod;
 use draw::draw_with_work;
-pub use draw::{Picture, draw};
+pub use draw::{LightPicture, draw};
 use generator::Ocean;
 use light::Seen;
-pub use light::{Eye, Floor, Light, Squares, error};
+pub use light::{DrawnLight, Eye, Floor, Squares, error};
 pub use shader::draw_on;
 use shader::tone_on;
 
@@ -76,7 +76,7 @@ pub struct CausticsOptions {
     /// stays the same, but sides of beams cross.
     pub pleat: f64,
     /// How beams are rasterized.
-    pub method: Method,
+    pub method: BeamMethod,
     /// View of the light.
     pub look: LightView,
 }
@@ -92,7 +92,7 @@ impl Default for CausticsOptions {
             wave_m: 4.0,
             slope: 0.15,
             pleat: 0.0,
-            method: Method::Moving,
+            method: BeamMethod::Moving,
             look: LightView::Volume,
         }
     }
@@ -126,7 +126,7 @@ pub(crate) const FLAGS: Flags = Flags { uses: &[Flag::Size], instead: &[] };
 ///
 /// # Errors
 /// [`LoadError`] for an invalid option or setting.
-pub fn job(options: &OptionSource, request: &Request<'_>) -> Result<Box<dyn Job>, LoadError> {
+pub fn job(options: &OptionSource, request: &JobRequest<'_>) -> Result<Box<dyn Job>, LoadError> {
     let options: CausticsOptions = options.read()?;
     options.check()?;
     let settings = Settings {
@@ -166,7 +166,7 @@ impl Draws for Caustics {
         let (picture, buffer) = draw_on(gpu, &beams, &eye, method, self.light())?;
         Ok(Drawn {
             image: tone_on(gpu, &eye, &picture.light, buffer, white(&picture.light)),
-            moving: method == Method::Moving,
+            moving: method == BeamMethod::Moving,
             lens: false,
             facts: facts(&picture, &beams),
             warnings: accuracy_warnings(&self.ocean, &beams),
@@ -175,10 +175,10 @@ impl Draws for Caustics {
 }
 
 impl Caustics {
-    fn light(&self) -> Light {
+    fn light(&self) -> DrawnLight {
         match self.options.look {
-            LightView::Volume => Light::Volume,
-            LightView::Floor => Light::Floor(Floor { height_m: -self.options.depth_m }),
+            LightView::Volume => DrawnLight::Volume,
+            LightView::Floor => DrawnLight::Floor(Floor { height_m: -self.options.depth_m }),
         }
     }
 
@@ -212,7 +212,7 @@ facts! {
     beams_left_out "count" "light volumes that are not drawn: without volume, or reaching behind the camera"
 }
 
-fn facts(picture: &Picture, beams: &[Beam]) -> Vec<Fact> {
+fn facts(picture: &LightPicture, beams: &[Beam]) -> Vec<Fact> {
     let runs = picture.total_runs() as f64;
     Fact::all([
         (fact::beams, beams.len() as f64),
@@ -265,7 +265,7 @@ impl Coverage {
 }
 
 /// Tests every beam at the floor point of every pixel, and counts the pairs that a method misses.
-pub fn receivers(beams: &[Beam], eye: &Eye, method: Method, floor: &Floor) -> Coverage {
+pub fn receivers(beams: &[Beam], eye: &Eye, method: BeamMethod, floor: &Floor) -> Coverage {
     let (picture, mut work) = draw_with_work(beams, eye, method, None, true);
     work.sort_by_key(|work| (work.beam, work.tile));
     let (width, height) = (eye.viewport().width(), eye.viewport().height());
@@ -368,7 +368,7 @@ mod tests {
     fn drawn(set: &[(&str, &str)]) -> (Drawn, Counts) {
         let set = set.iter().map(|(name, value)| ((*name).to_owned(), (*value).to_owned())).collect();
         let overrides = Overrides { size: Some((96, 54)), ..Overrides::default() };
-        let request = Request { overrides: &overrides, seed: 1 };
+        let request = JobRequest { overrides: &overrides, seed: 1 };
         let job = job(&OptionSource { file: None, set }, &request).unwrap();
         let hardware = hardware();
         let mut gpu = Gpu::without_packets(&hardware).unwrap();
@@ -416,16 +416,16 @@ mod tests {
         let view = [DVec3::new(6.0, 7.0, 20.0), DVec3::new(0.5, -2.0, 0.0), DVec3::Y];
         let (beams, eye) = (ocean.beams(0.0), Eye::new(view, 4.0, size).unwrap());
         let hardware = hardware();
-        for method in Method::ALL {
+        for method in BeamMethod::ALL {
             let mut gpu = Gpu::without_packets(&hardware).unwrap();
-            let (picture, _) = draw_on(&mut gpu, &beams, &eye, method, Light::Volume).unwrap();
-            assert_eq!(picture, draw(&beams, &eye, method, Some(Light::Volume)), "{method:?}");
+            let (picture, _) = draw_on(&mut gpu, &beams, &eye, method, DrawnLight::Volume).unwrap();
+            assert_eq!(picture, draw(&beams, &eye, method, Some(DrawnLight::Volume)), "{method:?}");
             // Still bodies are moved to the image once, moving triangles at both ends.
             let counts = gpu.finish().counts();
-            let bytes = if method == Method::Moving { 24 } else { 12 };
+            let bytes = if method == BeamMethod::Moving { 24 } else { 12 };
             assert_eq!(counts[Event::VertexBytes], bytes * counts[Event::VerticesFetched]);
             // Bounding volumes are made by a lane for each beam.
-            let groups = if method == Method::Moving { 0 } else { beams.len().div_ceil(64) as u64 };
+            let groups = if method == BeamMethod::Moving { 0 } else { beams.len().div_ceil(64) as u64 };
             assert_eq!(counts[Event::Groups], groups);
             assert_eq!(counts[Event::BufferLines] > 0, groups > 0);
         }
@@ -453,7 +453,7 @@ mod tests {
             ("method", "\"uncut\""),
         ] {
             let set = vec![(name.to_owned(), value.to_owned())];
-            let made = job(&OptionSource { file: None, set }, &Request { overrides: &overrides, seed: 1 });
+            let made = job(&OptionSource { file: None, set }, &JobRequest { overrides: &overrides, seed: 1 });
             let error = made.err().map(|error| error.to_string()).unwrap_or_default();
             assert!(error.contains(name), "{name}: {error}");
         }

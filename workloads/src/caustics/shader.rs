@@ -12,10 +12,11 @@ use pipeline::{
 
 use super::bound::BoundingVolume;
 use super::draw::{
-    MAX_HALVINGS, Picture, TILE_PX, in_image, pixel_of, reach, reach_of_face, set_bits, slack, within_reach,
+    LightPicture, MAX_HALVINGS, TILE_PX, in_image, pixel_of, reach, reach_of_face, set_bits, slack,
+    within_reach,
 };
 use super::light::{PixelInBeam, Seen};
-use super::{Beam, Eye, Light, Method};
+use super::{Beam, BeamMethod, DrawnLight, Eye};
 
 /// Bytes of a vertex at one end of a beam.
 const VERTEX_BYTES: u32 = 12;
@@ -82,9 +83,9 @@ pub fn draw_on(
     gpu: &mut Gpu<'_>,
     beams: &[Beam],
     eye: &Eye,
-    method: Method,
-    light: Light,
-) -> Result<(Picture, LightBuffer), PassError> {
+    method: BeamMethod,
+    light: DrawnLight,
+) -> Result<(LightPicture, LightBuffer), PassError> {
     let seen: Vec<Option<Seen>> = beams.iter().map(|beam| eye.see(beam)).collect();
     let viewport = eye.viewport();
     let [half_width, half_height] = viewport.half_px().map(f64::from);
@@ -94,13 +95,13 @@ pub fn draw_on(
     let region = gpu.allocate(u64::from(columns * rows) * TILE_PIXELS * LIGHT_BYTES);
     let buffer = LightBuffer { region, columns };
     let (primitives, faces) = primitives(&seen, method, &grid);
-    let input = if method == Method::Moving {
+    let input = if method == BeamMethod::Moving {
         Input::moving(gpu, primitives.len() as u64, seen.len() as u64)
     } else {
         Input::bodies(gpu, method, &seen, &faces)?
     };
     let marks = gpu.allocate(u64::from(columns * rows) * MARK_STRIDE);
-    let mut picture = Picture {
+    let mut picture = LightPicture {
         light: vec![0.0; viewport.pixels()],
         runs: vec![0; viewport.pixels()],
         useful: 0,
@@ -156,7 +157,7 @@ impl Input {
     /// The faces of bodies, which a pass makes from the beams.
     fn bodies(
         gpu: &mut Gpu<'_>,
-        method: Method,
+        method: BeamMethod,
         seen: &[Option<Seen>],
         faces: &[Face],
     ) -> Result<Self, PassError> {
@@ -188,7 +189,7 @@ fn firsts(beams: usize, faces: &[Face]) -> Vec<u32> {
 
 /// Makes bounding volumes, a lane each.
 struct VolumeShader<'a> {
-    method: Method,
+    method: BeamMethod,
     seen: &'a [Option<Seen>],
     beams: Buffer<f32>,
     faces: Buffer<f32>,
@@ -231,7 +232,7 @@ struct Face {
 }
 
 /// The triangles of every beam, and what they are.
-fn primitives(seen: &[Option<Seen>], method: Method, grid: &Grid) -> (Vec<Primitive>, Vec<Face>) {
+fn primitives(seen: &[Option<Seen>], method: BeamMethod, grid: &Grid) -> (Vec<Primitive>, Vec<Face>) {
     let whole = Rasterizer::new(View::orthographic()).halving(MAX_HALVINGS);
     let (mut primitives, mut faces, mut volume) = (Vec::new(), Vec::new(), BoundingVolume::new());
     let mut add = |beam: usize, ends: [[DVec3; 3]; 2], corners: Option<[DVec3; 3]>| {
@@ -251,7 +252,7 @@ fn primitives(seen: &[Option<Seen>], method: Method, grid: &Grid) -> (Vec<Primit
     };
     for (beam, seen) in seen.iter().enumerate() {
         let Some(seen) = seen else { continue };
-        if method == Method::Moving {
+        if method == BeamMethod::Moving {
             add(beam, [seen.image.open, seen.image.close], None);
             continue;
         }
@@ -266,7 +267,7 @@ struct LightShader<'a> {
     eye: &'a Eye,
     seen: &'a [Option<Seen>],
     faces: &'a [Face],
-    light: Light,
+    light: DrawnLight,
     buffer: LightBuffer,
     input: Input,
     /// Marks of the tiles, row by row.

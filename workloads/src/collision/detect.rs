@@ -3,39 +3,39 @@
 use rayon::prelude::*;
 
 use super::object::Object;
-use super::pair::{Method, Pair, Search, Verdict};
+use super::pair::{CollisionMethod, Pair, PairSearch, PairVerdict};
 use super::pass::{FragmentBudget, Part, PassBackend, Resources, Scratch};
 use super::{Bounds, contact_probe};
 
 /// Verdict on objects `a` and `b`, `a < b`.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Answer {
+pub struct PairAnswer {
     /// Index of one object.
     pub a: usize,
     /// Index of the other object, which is greater.
     pub b: usize,
     /// Whether the objects may collide.
-    pub verdict: Verdict,
+    pub verdict: PairVerdict,
 }
 
 /// Verdicts on all pairs whose swept boxes touch, in order; all other pairs are apart. Runs on the current
 /// thread pool; the results do not depend on the number of threads.
-pub fn detect(objects: &[Object], search: &Search) -> Vec<Answer> {
+pub fn detect(objects: &[Object], search: &PairSearch) -> Vec<PairAnswer> {
     detect_each(&[objects], search, || ()).pop().unwrap_or_default()
 }
 
 /// The same for the objects of several cases, whose pairs share the threads. `done` is called by any thread
 /// after each pair.
-pub fn detect_each(cases: &[&[Object]], search: &Search, done: impl Fn() + Sync) -> Vec<Vec<Answer>> {
+pub fn detect_each(cases: &[&[Object]], search: &PairSearch, done: impl Fn() + Sync) -> Vec<Vec<PairAnswer>> {
     let of_case =
         |(case, objects): (usize, &&[Object])| candidates(objects).into_iter().map(move |pair| (case, pair));
     let pairs: Vec<_> = cases.iter().enumerate().flat_map(of_case).collect();
     let search_pair = |scratch: &mut Scratch, &(case, (a, b)): &(usize, (usize, usize))| {
         let verdict = search.pair(&cases[case][a], &cases[case][b], scratch);
         done();
-        Answer { a, b, verdict }
+        PairAnswer { a, b, verdict }
     };
-    let found: Vec<Answer> =
+    let found: Vec<PairAnswer> =
         pairs.par_iter().with_max_len(1).map_init(Scratch::default, search_pair).collect();
     let mut answers = vec![Vec::new(); cases.len()];
     for ((case, _), answer) in pairs.into_iter().zip(found) {
@@ -60,9 +60,9 @@ const MAX_TRIANGLES_UNREFINED: usize = 64;
 /// 16 time bins.
 pub(super) const UNREFINED_FRAGMENTS: u64 = 3 * 2 * 2 * 128 * 128 * 16;
 
-impl Search {
+impl PairSearch {
     /// Whether `a` and `b` may collide.
-    pub(super) fn pair(&self, a: &Object, b: &Object, scratch: &mut Scratch) -> Verdict {
+    pub(super) fn pair(&self, a: &Object, b: &Object, scratch: &mut Scratch) -> PairVerdict {
         self.pair_observed(a, b, scratch, &mut ())
     }
 
@@ -73,7 +73,7 @@ impl Search {
         b: &Object,
         scratch: &mut Scratch,
         backend: &mut impl PassBackend,
-    ) -> Verdict {
+    ) -> PairVerdict {
         let largest = a.largest().max(b.largest());
         if largest > 0.0 && largest < MAX_SCALED_COORDINATE {
             let factor = upscale_factor(largest);
@@ -88,7 +88,7 @@ impl Search {
         objects: [&Object; 2],
         scratch: &mut Scratch,
         backend: &mut impl PassBackend,
-    ) -> Verdict {
+    ) -> PairVerdict {
         if self.zoom {
             return self.refined(objects, scratch, backend);
         }
@@ -96,12 +96,16 @@ impl Search {
     }
 
     /// Draws a pair once, at the requested resolution. A pair that exceeds the budget stays.
-    fn unrefined(&self, objects: [&Object; 2], resources: &mut Resources<'_, impl PassBackend>) -> Verdict {
-        let Some(mut pair) = Pair::new(objects, [0.0, 1.0], self) else { return Verdict::Apart };
-        if self.method == Method::DepthOnly {
+    fn unrefined(
+        &self,
+        objects: [&Object; 2],
+        resources: &mut Resources<'_, impl PassBackend>,
+    ) -> PairVerdict {
+        let Some(mut pair) = Pair::new(objects, [0.0, 1.0], self) else { return PairVerdict::Apart };
+        if self.method == CollisionMethod::DepthOnly {
             return pair.by_depth(resources);
         }
-        if pair.tighten() { pair.once(resources) } else { Verdict::Apart }
+        if pair.tighten() { pair.once(resources) } else { PairVerdict::Apart }
     }
 
     /// Refines a pair. One of few triangles that stays is drawn unrefined, too, as refinement may end with tiles that
@@ -111,10 +115,10 @@ impl Search {
         objects: [&Object; 2],
         scratch: &mut Scratch,
         backend: &mut impl PassBackend,
-    ) -> Verdict {
-        let Some(mut pair) = Pair::new(objects, [0.0, 1.0], self) else { return Verdict::Apart };
+    ) -> PairVerdict {
+        let Some(mut pair) = Pair::new(objects, [0.0, 1.0], self) else { return PairVerdict::Apart };
         if !pair.tighten() {
-            return Verdict::Apart;
+            return PairVerdict::Apart;
         }
         if contact_probe::finds_contact(pair.parts(), &pair.window) {
             return pair.maybe(0, true);
@@ -127,21 +131,26 @@ impl Search {
         let budget = FragmentBudget::of(UNREFINED_FRAGMENTS);
         let unrefined = Self { zoom: false, ..*self };
         match unrefined.unrefined(objects, &mut Resources { scratch, budget, backend }) {
-            Verdict::Apart => Verdict::Apart,
-            Verdict::Maybe { .. } => verdict,
+            PairVerdict::Apart => PairVerdict::Apart,
+            PairVerdict::Maybe { .. } => verdict,
         }
     }
 
     /// Refines what remains of a pair, in the frame of the larger object if that moves.
-    fn closer(&self, pair: &mut Pair<'_>, scratch: &mut Scratch, backend: &mut impl PassBackend) -> Verdict {
-        if self.method == Method::DepthOnly {
+    fn closer(
+        &self,
+        pair: &mut Pair<'_>,
+        scratch: &mut Scratch,
+        backend: &mut impl PassBackend,
+    ) -> PairVerdict {
+        if self.method == CollisionMethod::DepthOnly {
             return pair.refine_by_depth(scratch, backend);
         }
         let Some(seen) = InFrame::new(pair.parts(), &pair.window) else {
             return pair.refine(scratch, backend);
         };
         let in_frame = Pair::new(seen.objects.each_ref(), pair.window.time, self);
-        in_frame.map_or(Verdict::Apart, |mut in_frame| seen.to_world(in_frame.refine(scratch, backend)))
+        in_frame.map_or(PairVerdict::Apart, |mut in_frame| seen.to_world(in_frame.refine(scratch, backend)))
     }
 }
 
@@ -206,15 +215,15 @@ impl InFrame {
     }
 
     /// Transforms the bounds of a verdict back to world space.
-    pub fn to_world(&self, verdict: Verdict) -> Verdict {
-        let Verdict::Maybe { mut bounds, tiles, seen } = verdict else { return verdict };
+    pub fn to_world(&self, verdict: PairVerdict) -> PairVerdict {
+        let PairVerdict::Maybe { mut bounds, tiles, seen } = verdict else { return verdict };
         for (range, translation) in bounds.space.iter_mut().zip(self.translation) {
             let [from, to] = bounds.time.map(|t| t * translation);
             let size = range[0].abs().max(range[1].abs()) + translation.abs();
             let margin = if translation == 0.0 { 0.0 } else { 4.0 * f64::EPSILON * size };
             *range = [range[0] + from.min(to) - margin, range[1] + from.max(to) + margin];
         }
-        Verdict::Maybe { bounds, tiles, seen }
+        PairVerdict::Maybe { bounds, tiles, seen }
     }
 }
 
@@ -264,8 +273,8 @@ mod tests {
         assert_eq!(seen.objects[1].triangles[0][0], seen.objects[1].triangles[0][1]);
         assert_eq!(seen.objects[0].triangles[0][1], square(-6.5, 1.0));
         let bounds = Bounds { space: [[1.0, 2.0], [0.0, 1.0], [0.0, 0.0]], time: [0.25, 0.5] };
-        let Verdict::Maybe { bounds: to_world, .. } =
-            seen.to_world(Verdict::Maybe { bounds, tiles: 1, seen: false })
+        let PairVerdict::Maybe { bounds: to_world, .. } =
+            seen.to_world(PairVerdict::Maybe { bounds, tiles: 1, seen: false })
         else {
             panic!("a pair that may collide")
         };

@@ -11,10 +11,11 @@ use super::families::swarm_of;
 use super::object::load_objects;
 use super::on_gpu::{Emitted, PassesOnGpu};
 use super::pass::Scratch;
-use super::{Method, Object, Search, Sweeps, candidates};
+use super::{CollisionMethod, Object, PairSearch, Sweeps, candidates};
 use crate::error::LoadError;
 use crate::job::{
-    Drawn, Draws, Fact, Flag, Flags, Job, JobError, JobOptions, Need, OptionSource, Request, facts, must_hold,
+    Drawn, Draws, Fact, Flag, Flags, Job, JobError, JobOptions, JobRequest, Need, OptionSource, facts,
+    must_hold,
 };
 use crate::scene::Settings;
 
@@ -31,7 +32,7 @@ pub struct CollisionOptions {
     /// Time bins per tile, 1 to 256.
     pub bins: u32,
     /// What a pass compares.
-    pub method: Method,
+    pub method: CollisionMethod,
     /// Whether pairs whose swept boxes touch are drawn one by one within the space they share, of which the
     /// CPU narrows more from axis to axis, instead of two sweeps over all objects.
     pub narrow: bool,
@@ -43,7 +44,14 @@ impl JobOptions for CollisionOptions {
 
 impl Default for CollisionOptions {
     fn default() -> Self {
-        Self { file: None, balls: 12, resolution: 64, bins: 1, method: Method::FragmentBox, narrow: false }
+        Self {
+            file: None,
+            balls: 12,
+            resolution: 64,
+            bins: 1,
+            method: CollisionMethod::FragmentBox,
+            narrow: false,
+        }
     }
 }
 
@@ -83,7 +91,7 @@ impl CollisionOptions {
 
 /// The job and its objects.
 struct Collision {
-    search: Search,
+    search: PairSearch,
     narrow: bool,
     viewport: Viewport,
     objects: Vec<Object>,
@@ -105,7 +113,7 @@ pub(crate) const FLAGS: Flags = Flags { uses: &[], instead: &[(Flag::Size, "reso
 ///
 /// # Errors
 /// [`LoadError`] for an invalid option, or a file that cannot be read.
-pub fn job(options: &OptionSource, request: &Request<'_>) -> Result<Box<dyn Job>, LoadError> {
+pub fn job(options: &OptionSource, request: &JobRequest<'_>) -> Result<Box<dyn Job>, LoadError> {
     let options: CollisionOptions = options.read()?;
     options.check()?;
     let CollisionOptions { resolution, bins, method, narrow, .. } = options;
@@ -116,7 +124,7 @@ pub fn job(options: &OptionSource, request: &Request<'_>) -> Result<Box<dyn Job>
         table: "none".to_owned(),
         ..Settings::default()
     };
-    let search = Search { resolution, bins, method, zoom: false };
+    let search = PairSearch { resolution, bins, method, zoom: false };
     let settings = settings.with(request.overrides)?;
     let refused = || LoadError::Setting { setting: "resolution", message: "1 to 1024 pixels".to_owned() };
     let viewport = Viewport::new(resolution, resolution).ok_or_else(refused)?;
@@ -147,7 +155,7 @@ impl Draws for Collision {
     }
 
     fn draw(&self, (): &(), gpu: &mut Gpu<'_>) -> Result<Drawn, JobError> {
-        let Search { method, bins, resolution, .. } = self.search;
+        let PairSearch { method, bins, resolution, .. } = self.search;
         let mut passes = PassesOnGpu::new((method, self.viewport, bins), &self.objects, gpu);
         let pairs = candidates(&self.objects);
         let (may_collide, kept) = if self.narrow {
@@ -211,15 +219,15 @@ mod tests {
 
     fn made(set: &[(&str, &str)]) -> Result<Box<dyn Job>, LoadError> {
         let set = set.iter().map(|(name, value)| ((*name).to_owned(), (*value).to_owned())).collect();
-        job(&OptionSource { file: None, set }, &Request { overrides: &Overrides::default(), seed: 1 })
+        job(&OptionSource { file: None, set }, &JobRequest { overrides: &Overrides::default(), seed: 1 })
     }
 
     #[test]
     fn packets_add_up_and_the_answer_is_that_of_the_search_and_of_the_sweeps() {
         for (name, method) in [
-            ("fragment_box", Method::FragmentBox),
-            ("box_box", Method::BoxBox),
-            ("depth_only", Method::DepthOnly),
+            ("fragment_box", CollisionMethod::FragmentBox),
+            ("box_box", CollisionMethod::BoxBox),
+            ("depth_only", CollisionMethod::DepthOnly),
         ] {
             for narrow in ["false", "true"] {
                 let job = made(&[("resolution", "16"), ("balls", "6"), ("method", name), ("narrow", narrow)])
@@ -235,7 +243,7 @@ mod tests {
                 assert!(counts[Event::PixelInvocations] >= fact("fragments") as u64, "{name}");
                 let objects = swarm_of(6, 1);
                 let kept = if narrow == "true" {
-                    let search = Search { resolution: 16, bins: 1, method, zoom: false };
+                    let search = PairSearch { resolution: 16, bins: 1, method, zoom: false };
                     let found = detect(&objects, &search);
                     found.iter().filter(|answer| answer.verdict.may_collide()).count()
                 } else {

@@ -13,7 +13,7 @@
 //! - [`Object`]: moving triangles of a mesh; [`components`] splits a mesh.
 //! - [`Bounds`]: boxes of space and time, swept and exact; boxes of time and depth per tile.
 //! - [`candidates`]: the broad phase, pairs whose swept boxes touch.
-//! - [`Search`], [`Method`]: parameters of a search; [`Verdict`]: its result.
+//! - [`PairSearch`], [`CollisionMethod`]: parameters of a search; [`PairVerdict`]: its result.
 //! - [`detect`]: all pairs of a case.
 //! - [`Sweeps`]: the method of the paper for many objects, in two sweeps over all of them.
 //! - [`PlainPasses`]: the passes of the paper for two objects, without narrowing on the CPU.
@@ -30,11 +30,11 @@ mod pair;
 mod pass;
 mod plain;
 
-pub use detect::{Answer, candidates, detect, detect_each};
+pub use detect::{PairAnswer, candidates, detect, detect_each};
 pub use job::{CollisionOptions, job};
 pub(crate) use job::{FACTS, FLAGS};
 pub use object::{CaseFiles, CollisionCase, Object, components, load_cases};
-pub use pair::{Method, Search, Verdict};
+pub use pair::{CollisionMethod, PairSearch, PairVerdict};
 pub use plain::{CollidingSet, Overlaps, PassWork, PlainPasses, Sweeps};
 
 /// Corners of a triangle at time 0 and at time 1.

@@ -9,7 +9,7 @@ use pipeline::{
 
 use super::object::Object;
 use super::pass::{BinnedPrimitive, Fragment, FragmentBudget, Part, Pass, PassBackend};
-use super::{Bounds, Method, TzBox, TzBuffer};
+use super::{Bounds, CollisionMethod, TzBox, TzBuffer};
 
 /// Bytes of a vertex at both times.
 const VERTEX_BYTES: u32 = 24;
@@ -32,9 +32,9 @@ struct BoxLayout {
 }
 
 impl BoxLayout {
-    fn new(viewport: Viewport, tile_px: u32, bins: u32, method: Method) -> Self {
+    fn new(viewport: Viewport, tile_px: u32, bins: u32, method: CollisionMethod) -> Self {
         // By depth alone there are no times.
-        let intervals = if method == Method::DepthOnly { 1 } else { 2 };
+        let intervals = if method == CollisionMethod::DepthOnly { 1 } else { 2 };
         Self {
             side: tile_px,
             across: viewport.width().div_ceil(tile_px),
@@ -68,8 +68,8 @@ pub(super) struct PassesOnGpu<'a, 'e> {
     boxes: [MemoryRange; 2],
     /// Answers about the objects of a pass, and how many there are so far.
     answers: MemoryRange,
-    asked: u64,
-    method: Method,
+    answered: u64,
+    method: CollisionMethod,
     fragments: u64,
 }
 
@@ -82,7 +82,7 @@ pub(super) struct Emitted {
 impl<'a, 'e> PassesOnGpu<'a, 'e> {
     /// Makes passes with square images of `viewport` and `bins` boxes in a pixel.
     pub fn new(
-        (method, viewport, bins): (Method, Viewport, u32),
+        (method, viewport, bins): (CollisionMethod, Viewport, u32),
         objects: &[Object],
         gpu: &'a mut Gpu<'e>,
     ) -> Self {
@@ -92,21 +92,21 @@ impl<'a, 'e> PassesOnGpu<'a, 'e> {
         let boxes = [(); 2].map(|()| gpu.allocate(layout.bytes()));
         let picture = Picture::new(objects, viewport.width() as usize);
         let answers = gpu.allocate(objects.len() as u64 * ANSWER_BYTES);
-        let (pass, asked, fragments) = Default::default();
-        Self { gpu, pass, vertices, picture, viewport, layout, boxes, answers, asked, method, fragments }
+        let (pass, answered, fragments) = Default::default();
+        Self { gpu, pass, vertices, picture, viewport, layout, boxes, answers, answered, method, fragments }
     }
 
     /// The answers of a pass are in memory when it ends, for the host to read.
     fn end_pass(&mut self) {
-        if std::mem::take(&mut self.asked) > 0 {
+        if std::mem::take(&mut self.answered) > 0 {
             self.gpu.keep(self.answers);
         }
     }
 
     /// Where the next answer is.
     fn next_answer(&mut self) -> u64 {
-        self.asked += 1;
-        (self.asked - 1) * ANSWER_BYTES
+        self.answered += 1;
+        (self.answered - 1) * ANSWER_BYTES
     }
 
     /// Writes the image and returns the totals.
@@ -127,7 +127,7 @@ impl<'a, 'e> PassesOnGpu<'a, 'e> {
 
     /// Where the boxes of a part are. The second part only reads those of the first unless boxes are compared.
     fn target(&self, which: usize, is_test: bool) -> MemoryRange {
-        self.boxes[if is_test || self.method == Method::FragmentBox { 0 } else { which }]
+        self.boxes[if is_test || self.method == CollisionMethod::FragmentBox { 0 } else { which }]
     }
 }
 
@@ -236,7 +236,7 @@ impl PassBackend for PassesOnGpu<'_, '_> {
                 targets.iter().for_each(|target| lanes.read(*target, offset, layout.box_bytes));
                 let (one, other) = (first.at(place), second.at(place));
                 let met = lanes.run(|lane| match method {
-                    Method::DepthOnly => meets_in_depth(lane, one, other.z),
+                    CollisionMethod::DepthOnly => meets_in_depth(lane, one, other.z),
                     _ => meets(lane, one, other.t, other.z),
                 });
                 if met {
@@ -340,8 +340,8 @@ mod tests {
     #[test]
     fn every_box_has_a_place_of_its_own_in_the_buffer() {
         let of = |method| BoxLayout::new(Viewport::new(19, 19).unwrap(), 8, 3, method);
-        let layout = of(Method::BoxBox);
-        assert_eq!(layout.bytes(), 2 * of(Method::DepthOnly).bytes());
+        let layout = of(CollisionMethod::BoxBox);
+        assert_eq!(layout.bytes(), 2 * of(CollisionMethod::DepthOnly).bytes());
         let places = (0..19 * 19 * 3).map(|n| layout.offset([n % 19, n / 19 % 19], (n / (19 * 19)) as usize));
         let mut places: Vec<u64> = places.collect();
         assert_eq!(layout.offset([8, 0], 1), (64 * 3 + 1) * layout.box_bytes);
@@ -356,7 +356,7 @@ mod tests {
     fn answers_are_in_memory() {
         let objects = super::super::families::swarm_of(6, 1);
         let hardware = crate::job::testing::hardware();
-        for method in [Method::FragmentBox, Method::BoxBox, Method::DepthOnly] {
+        for method in [CollisionMethod::FragmentBox, CollisionMethod::BoxBox, CollisionMethod::DepthOnly] {
             let (viewport, mut lines) = (Viewport::new(16, 16).unwrap(), std::collections::HashSet::new());
             let mut gpu = Gpu::new(&hardware, |_, of_packet| {
                 of_packet.iter().for_each(|access| lines.extend(access.written()));
@@ -372,7 +372,7 @@ mod tests {
             let counts = gpu.finish().counts();
             // A box is eight words, an answer one; by depth alone, one direction is enough for a mark.
             let words = counts[Event::DepthWrites] % 8;
-            assert!(method == Method::DepthOnly || words == u64::from(marks % 8), "{method:?}");
+            assert!(method == CollisionMethod::DepthOnly || words == u64::from(marks % 8), "{method:?}");
             assert!(fragments > 0 && marks > 0);
             assert!(lines.contains(&((answers.address() / 64) as u32)), "{method:?}");
         }

@@ -12,7 +12,7 @@ use super::pass::{
 /// What a pass compares in a tile.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Method {
+pub enum CollisionMethod {
     /// Each fragment of one object with the box of the other (thesis, Paper VI, Fig. 5, right).
     #[default]
     FragmentBox,
@@ -24,26 +24,26 @@ pub enum Method {
 
 /// Parameters of the search.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Search {
+pub struct PairSearch {
     /// Tiles across, 1 to 1024.
     pub resolution: u32,
     /// Time bins per tile, 1 to 256.
     pub bins: u32,
     /// What is compared.
-    pub method: Method,
+    pub method: CollisionMethod,
     /// Whether to refine: search the remaining space and time again with smaller tiles.
     pub zoom: bool,
 }
 
-impl Default for Search {
+impl Default for PairSearch {
     fn default() -> Self {
-        Self { resolution: 128, bins: 16, method: Method::FragmentBox, zoom: true }
+        Self { resolution: 128, bins: 16, method: CollisionMethod::FragmentBox, zoom: true }
     }
 }
 
 /// Result of a search.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Verdict {
+pub enum PairVerdict {
     /// The objects do not collide.
     Apart,
     /// The objects may collide; every contact lies within `bounds`.
@@ -57,7 +57,7 @@ pub enum Verdict {
     },
 }
 
-impl Verdict {
+impl PairVerdict {
     /// Scales the bounds by `factor`.
     pub(super) fn scaled(self, factor: f64) -> Self {
         let Self::Maybe { bounds, tiles, seen } = self else { return self };
@@ -112,22 +112,22 @@ pub(super) struct Pair<'a> {
     /// Triangles of each object that may be in the window.
     lists: [Vec<u32>; 2],
     pub window: Bounds,
-    pub search: &'a Search,
+    pub search: &'a PairSearch,
 }
 
 impl<'a> Pair<'a> {
     /// All triangles of both objects, in the intersection of their boxes during `time`; `None` if that is
     /// empty.
-    pub fn new(objects: [&'a Object; 2], time: [f64; 2], search: &'a Search) -> Option<Self> {
+    pub fn new(objects: [&'a Object; 2], time: [f64; 2], search: &'a PairSearch) -> Option<Self> {
         let shared = objects[0].bounds.meet(&objects[1].bounds)?;
         let lists = objects.map(|object| (0..object.len() as u32).collect());
         Some(Self { objects, lists, window: Bounds { time, ..shared }, search })
     }
 
     /// Searches by depths alone, without time bins. A pair that exceeds the budget stays.
-    pub fn by_depth(&self, resources: &mut Resources<'_, impl PassBackend>) -> Verdict {
+    pub fn by_depth(&self, resources: &mut Resources<'_, impl PassBackend>) -> PairVerdict {
         match self.depths(self.search.resolution, resources) {
-            Some(0) => Verdict::Apart,
+            Some(0) => PairVerdict::Apart,
             tiles => self.maybe(tiles.unwrap_or(0), false),
         }
     }
@@ -147,20 +147,20 @@ impl<'a> Pair<'a> {
     }
 
     /// Searches once, at the requested resolution. A pair that exceeds the budget stays.
-    pub fn once(&mut self, resources: &mut Resources<'_, impl PassBackend>) -> Verdict {
-        let Search { resolution, bins, .. } = *self.search;
+    pub fn once(&mut self, resources: &mut Resources<'_, impl PassBackend>) -> PairVerdict {
+        let PairSearch { resolution, bins, .. } = *self.search;
         match self.round(PassParams { resolution, bins, fit: Fit::Edges }, resources) {
-            PairResult::Apart => Verdict::Apart,
+            PairResult::Apart => PairVerdict::Apart,
             PairResult::BudgetExceeded => self.maybe(0, false),
             PairResult::Overlap(Round { window, tiles, seen }) => {
-                Verdict::Maybe { bounds: window, tiles, seen }
+                PairVerdict::Maybe { bounds: window, tiles, seen }
             }
         }
     }
 
     /// The verdict that the pair may collide within the window.
-    pub fn maybe(&self, tiles: u64, seen: bool) -> Verdict {
-        Verdict::Maybe { bounds: self.window, tiles, seen }
+    pub fn maybe(&self, tiles: u64, seen: bool) -> PairVerdict {
+        PairVerdict::Maybe { bounds: self.window, tiles, seen }
     }
 
     /// Least useful width of a tile. Rounding of borders and uncertainty of corners are as large.
@@ -239,7 +239,7 @@ impl<'a> Pair<'a> {
         for bins in remaining.chunks((MAX_TILES_IN_MEMORY / pass.tiles()).max(1)) {
             let comparison = Comparison { pass, parts: self.parts(), bins };
             all.join(match self.search.method {
-                Method::BoxBox => comparison.boxes_against_boxes(resources),
+                CollisionMethod::BoxBox => comparison.boxes_against_boxes(resources),
                 _ => comparison.fragments_against_boxes(resources),
             }?);
         }
@@ -306,9 +306,9 @@ const SAMPLED_TRIANGLES: usize = 64;
 impl Pair<'_> {
     /// Searches with few tiles, then with more; smaller windows give smaller tiles. Many triangles are tested
     /// by their boxes until that no longer helps, the remaining ones by their edges.
-    pub fn refine(&mut self, scratch: &mut Scratch, backend: &mut impl PassBackend) -> Verdict {
+    pub fn refine(&mut self, scratch: &mut Scratch, backend: &mut impl PassBackend) -> PairVerdict {
         if !self.tighten() {
-            return Verdict::Apart;
+            return PairVerdict::Apart;
         }
         let most = self.search.resolution;
         let mut resources = Resources { scratch, budget: self.budget(), backend };
@@ -319,7 +319,7 @@ impl Pair<'_> {
             let (before, triangles) = (self.window, self.triangles());
             let params = PassParams { resolution, bins: self.bins(resolution), fit };
             let round = match self.round(params, &mut resources) {
-                PairResult::Apart => return Verdict::Apart,
+                PairResult::Apart => return PairVerdict::Apart,
                 PairResult::BudgetExceeded => break,
                 PairResult::Overlap(round) => round,
             };
@@ -329,7 +329,7 @@ impl Pair<'_> {
                 break;
             }
             if !self.tighten() {
-                return Verdict::Apart;
+                return PairVerdict::Apart;
             }
             if self.triangles() <= MIN_TRIANGLES_FOR_BOXES {
                 fit = Fit::Edges;
@@ -353,13 +353,13 @@ impl Pair<'_> {
 
     /// Searches by depths alone, with few tiles, then with more. Objects that few tiles separate are apart. A
     /// pair that exceeds its budget stays.
-    pub fn refine_by_depth(&self, scratch: &mut Scratch, backend: &mut impl PassBackend) -> Verdict {
+    pub fn refine_by_depth(&self, scratch: &mut Scratch, backend: &mut impl PassBackend) -> PairVerdict {
         let most = self.search.resolution;
         let mut resources = Resources { scratch, budget: self.budget(), backend };
         let (mut resolution, mut last) = (MIN_FIRST_TILES.min(most), 0);
         while let Some(tiles) = self.depths(resolution, &mut resources) {
             if tiles == 0 {
-                return Verdict::Apart;
+                return PairVerdict::Apart;
             }
             last = tiles;
             if resolution == most {
@@ -407,7 +407,7 @@ mod tests {
     use super::super::detect::UNREFINED_FRAGMENTS;
     use super::super::families::slide;
     use super::super::pass::{Fragment, Pass};
-    use super::super::{Method, Object, Search, detect};
+    use super::super::{CollisionMethod, Object, PairSearch, detect};
     use super::*;
 
     /// Counts fragments.
@@ -425,8 +425,8 @@ mod tests {
     fn refinement_ends_with_every_method() {
         let slanted = |x: f64| [[x, 0.0, 0.0], [x + 1.0, 0.0, 1.0], [x, 1.0, 1.0]];
         let object = |x: f64| Object::from_ends(vec![[slanted(x); 2]], 0.0).unwrap();
-        for method in [Method::FragmentBox, Method::BoxBox, Method::DepthOnly] {
-            let search = Search { resolution: 1024, bins: 16, method, zoom: true };
+        for method in [CollisionMethod::FragmentBox, CollisionMethod::BoxBox, CollisionMethod::DepthOnly] {
+            let search = PairSearch { resolution: 1024, bins: 16, method, zoom: true };
             let mut drawn = Drawn(0);
             let verdict =
                 search.pair_observed(&object(0.0), &object(1e-7), &mut Scratch::default(), &mut drawn);
@@ -449,7 +449,8 @@ mod tests {
         };
         let [a, b] = [object(0.0, 0.0), object(1e-7, 1e-3)];
         let drawn = |zoom: bool| {
-            let (search, mut drawn) = (Search { resolution: 288, zoom, ..Search::default() }, Drawn(0));
+            let (search, mut drawn) =
+                (PairSearch { resolution: 288, zoom, ..PairSearch::default() }, Drawn(0));
             let verdict = search.pair_observed(&a, &b, &mut Scratch::default(), &mut drawn);
             assert!(verdict.may_collide());
             drawn.0
@@ -464,7 +465,7 @@ mod tests {
     fn more_tiles_keep_no_more_plates_that_slide_along_each_other() {
         for gap in [0.03, 0.1] {
             let kept = |resolution: u32| {
-                let search = Search { resolution, ..Search::default() };
+                let search = PairSearch { resolution, ..PairSearch::default() };
                 let keeps = |seed: &u64| detect(&slide(*seed, gap), &search)[0].verdict.may_collide();
                 (0..8).filter(keeps).count()
             };
@@ -483,7 +484,7 @@ mod tests {
             [[floor; 2], [falling(1.0), falling(0.22)]].map(|ends| Object::from_ends(vec![ends], 0.0));
         let (a, b) = (a.unwrap(), b.unwrap());
         let drawn = |zoom: bool| {
-            let (search, mut drawn) = (Search { zoom, ..Search::default() }, Drawn(0));
+            let (search, mut drawn) = (PairSearch { zoom, ..PairSearch::default() }, Drawn(0));
             let verdict = search.pair_observed(&a, &b, &mut Scratch::default(), &mut drawn);
             assert!(verdict.may_collide());
             drawn.0

@@ -16,7 +16,7 @@ use pipeline::{Gpu, PipelineSpec, Viewport};
 use super::detect::{MAX_SCALED_COORDINATE, candidates, upscale_factor};
 use super::object::Object;
 use super::on_gpu::PassesOnGpu;
-use super::pair::{Method, time_bins};
+use super::pair::{CollisionMethod, time_bins};
 use super::pass::{
     Comparison, Fit, Fragment, FragmentBudget, Part, Pass, PassBackend, Resources, Scratch, Tiling,
 };
@@ -124,7 +124,7 @@ impl PlainPasses {
     }
 
     /// Draws both objects along each axis, on the host, and compares them by each of the `methods`.
-    pub fn pair(&mut self, [a, b]: [&Object; 2], methods: &[Method]) -> (Vec<Overlaps>, PassWork) {
+    pub fn pair(&mut self, [a, b]: [&Object; 2], methods: &[CollisionMethod]) -> (Vec<Overlaps>, PassWork) {
         let mut passes = HostPasses::default();
         let overlaps = self.overlaps([a, b], methods, &mut passes);
         (overlaps, passes.work)
@@ -137,7 +137,7 @@ impl PlainPasses {
     pub fn pair_on(
         &mut self,
         pair: &[Object; 2],
-        method: Method,
+        method: CollisionMethod,
         hardware: &PipelineSpec,
     ) -> Result<(Overlaps, PassWork), JobError> {
         let viewport = Viewport::new(self.resolution, self.resolution);
@@ -155,7 +155,7 @@ impl PlainPasses {
     fn overlaps(
         &mut self,
         objects: [&Object; 2],
-        methods: &[Method],
+        methods: &[CollisionMethod],
         backend: &mut impl PassBackend,
     ) -> Vec<Overlaps> {
         let largest = objects.iter().map(|object| object.largest()).fold(0.0, f64::max);
@@ -169,7 +169,7 @@ impl PlainPasses {
     fn draw_pair(
         &mut self,
         objects: [&Object; 2],
-        methods: &[Method],
+        methods: &[CollisionMethod],
         backend: &mut impl PassBackend,
     ) -> Vec<Overlaps> {
         let mut found = vec![Overlaps([0; 3]); methods.len()];
@@ -194,7 +194,7 @@ impl PlainPasses {
     /// Pixels of a pass in which both objects may touch.
     fn in_pass(
         &mut self,
-        method: Method,
+        method: CollisionMethod,
         comparison: &Comparison<'_>,
         backend: &mut impl PassBackend,
     ) -> u64 {
@@ -202,9 +202,13 @@ impl PlainPasses {
         let resources = &mut Resources { scratch, budget, backend };
         // The budget is unlimited, so there always is a result. Without one, the pair would have to stay.
         match method {
-            Method::DepthOnly => comparison.depths(resources).map_or(1, |[front, behind]| front.min(behind)),
-            Method::BoxBox => comparison.boxes_against_boxes(resources).map_or(1, |overlaps| overlaps.tiles),
-            Method::FragmentBox => {
+            CollisionMethod::DepthOnly => {
+                comparison.depths(resources).map_or(1, |[front, behind]| front.min(behind))
+            }
+            CollisionMethod::BoxBox => {
+                comparison.boxes_against_boxes(resources).map_or(1, |overlaps| overlaps.tiles)
+            }
+            CollisionMethod::FragmentBox => {
                 comparison.fragments_against_boxes(resources).map_or(1, |overlaps| overlaps.tiles)
             }
         }
@@ -215,7 +219,7 @@ impl PlainPasses {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Sweeps {
     /// What is compared.
-    pub method: Method,
+    pub method: CollisionMethod,
     /// Pixels across, 1 to 1024.
     pub resolution: u32,
     /// Time bins per pixel, 1 to 256.
@@ -312,7 +316,7 @@ const NAMES: [[&str; 2]; 3] =
 struct Sweep<'a> {
     pass: &'a Pass,
     bins: &'a [Option<Bounds>],
-    method: Method,
+    method: CollisionMethod,
     /// Boxes of all objects so far.
     known: TzBuffer,
     /// Boxes of one object.
@@ -326,11 +330,11 @@ impl Sweep<'_> {
         let list: Vec<u32> = (0..object.len() as u32).collect();
         let part = Part { object, list: &list };
         let found = match self.method {
-            Method::FragmentBox => self.fragments(part, backend),
+            CollisionMethod::FragmentBox => self.fragments(part, backend),
             _ => self.boxes(part, backend),
         };
         match self.method {
-            Method::FragmentBox => {
+            CollisionMethod::FragmentBox => {
                 let (pass, known) = (self.pass, &mut self.known);
                 let budget = &mut FragmentBudget::unlimited();
                 backend.draw(pass, (0, part), self.bins, budget, None, &mut |fragment| {
@@ -379,12 +383,12 @@ impl Sweep<'_> {
 
 /// By direction, whether two boxes meet; by depth alone, whether the second is in front of the farthest depth
 /// of the first, and whether it is behind the nearest.
-fn overlaps(method: Method, known: &TzBox, own: &TzBox) -> [bool; 2] {
+fn overlaps(method: CollisionMethod, known: &TzBox, own: &TzBox) -> [bool; 2] {
     if known.z[0] > known.z[1] {
         return [false; 2];
     }
     match method {
-        Method::DepthOnly => [own.z[0] <= known.z[1], own.z[1] >= known.z[0]],
+        CollisionMethod::DepthOnly => [own.z[0] <= known.z[1], own.z[1] >= known.z[0]],
         _ => [known.meet(own.t, own.z).is_some(); 2],
     }
 }
@@ -395,10 +399,11 @@ mod tests {
 
     use super::super::contact_probe::cross;
     use super::super::families::{Case, cases};
-    use super::super::{Search, detect};
+    use super::super::{PairSearch, detect};
     use super::*;
 
-    const METHODS: [Method; 3] = [Method::FragmentBox, Method::BoxBox, Method::DepthOnly];
+    const METHODS: [CollisionMethod; 3] =
+        [CollisionMethod::FragmentBox, CollisionMethod::BoxBox, CollisionMethod::DepthOnly];
 
     #[test]
     fn every_collision_stays_and_every_pass_is_drawn() {
@@ -429,11 +434,12 @@ mod tests {
     /// A pair that the passes separate is separated with narrowing on the CPU as well.
     #[test]
     fn pairs_that_plain_passes_separate_are_separated_by_the_search() {
-        let search = Search { resolution: 32, bins: 1, method: Method::FragmentBox, zoom: false };
+        let search =
+            PairSearch { resolution: 32, bins: 1, method: CollisionMethod::FragmentBox, zoom: false };
         let (mut alone, mut helped) = (0, 0);
         for case in cases(5, 3).iter().filter(|case| case.objects.len() == 2) {
             let pair = [&case.objects[0], &case.objects[1]];
-            let result = PlainPasses::new(32).pair(pair, &[Method::FragmentBox]).0[0];
+            let result = PlainPasses::new(32).pair(pair, &[CollisionMethod::FragmentBox]).0[0];
             let answers = detect(&case.objects, &search);
             helped += usize::from(answers.iter().all(|answer| !answer.verdict.may_collide()));
             alone += usize::from(!result.may_collide());
@@ -462,7 +468,7 @@ mod tests {
     #[test]
     fn empty_objects_are_apart() {
         let none = Object::from_ends(Vec::new(), 0.0).unwrap();
-        let (overlaps, work) = PlainPasses::new(8).pair([&none, &none], &[Method::BoxBox]);
+        let (overlaps, work) = PlainPasses::new(8).pair([&none, &none], &[CollisionMethod::BoxBox]);
         assert!(!overlaps[0].may_collide() && work == PassWork::default());
     }
 

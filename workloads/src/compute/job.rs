@@ -15,7 +15,7 @@ use super::luminance::Show;
 use super::{ComputeOptions, Kernel};
 use crate::error::LoadError;
 use crate::job::{
-    Drawn, DrawsScene, Fact, Flag, Flags, IMAGE_SIZE, Job, JobError, OptionSource, Request, facts,
+    Drawn, DrawsScene, Fact, Flag, Flags, IMAGE_SIZE, Job, JobError, JobRequest, OptionSource, facts,
 };
 use crate::scene::{Frame, Overrides, Scene};
 
@@ -38,7 +38,7 @@ pub(crate) const FLAGS: Flags =
 ///
 /// # Errors
 /// As [`Compute::new`].
-pub fn job(options: &OptionSource, request: &Request<'_>) -> Result<Box<dyn Job>, LoadError> {
+pub fn job(options: &OptionSource, request: &JobRequest<'_>) -> Result<Box<dyn Job>, LoadError> {
     Ok(Box::new(Compute::new(options.read()?, request.overrides, request.seed)?))
 }
 
@@ -247,7 +247,7 @@ pub const CHAIN: &str = "mean";
 pub struct Chain {
     /// The surface, at its finest level.
     pub pixels: SurfaceId,
-    /// Its last level, of one texel.
+    /// Last level of the chain, of one texel.
     pub last: SurfaceId,
     /// Luminance of that texel.
     pub mean: f32,

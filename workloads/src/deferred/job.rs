@@ -13,8 +13,8 @@ use warnings::{Code, Warning};
 use super::{CameraRays, Forward, GBuffer, NormalFormat, Screen, Volume, Writer, bounds, point_lights};
 use crate::error::LoadError;
 use crate::job::{
-    Drawn, DrawsScene, Fact, Flag, Flags, IMAGE_SIZE, Job, JobError, JobOptions, Need, OptionSource, Request,
-    facts, must_hold,
+    Drawn, DrawsScene, Fact, Flag, Flags, IMAGE_SIZE, Job, JobError, JobOptions, JobRequest, Need,
+    OptionSource, facts, must_hold,
 };
 use crate::material::{PointLight, SurfaceShader};
 use crate::samples::{SampleChoice, blur_warning};
@@ -24,7 +24,7 @@ use crate::shapes;
 /// How surfaces are lit.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
-pub enum Method {
+pub enum LightingMethod {
     /// From a G-buffer.
     #[default]
     Deferred,
@@ -46,7 +46,7 @@ pub enum LightPass {
 /// How often a G-buffer is lit.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
-pub enum Rate {
+pub enum LightingRate {
     /// For every sample.
     #[default]
     Sample,
@@ -61,7 +61,7 @@ pub struct DeferredOptions {
     /// A built-in scene or a file.
     pub scene: String,
     /// How surfaces are lit.
-    pub method: Method,
+    pub method: LightingMethod,
     /// Point lights besides the light of the scene.
     pub lights: u32,
     /// Range of a point light, scene units.
@@ -71,7 +71,7 @@ pub struct DeferredOptions {
     /// Format of its normals.
     pub normals: NormalFormat,
     /// How often it is lit.
-    pub rate: Rate,
+    pub rate: LightingRate,
 }
 
 impl JobOptions for DeferredOptions {
@@ -156,10 +156,10 @@ impl Deferred {
 
     fn regime_warnings(&self, frame: &Frame) -> Vec<Warning> {
         let mut warnings = Vec::new();
-        if self.options.method == Method::Forward {
+        if self.options.method == LightingMethod::Forward {
             return warnings;
         }
-        if self.options.rate == Rate::Pixel && self.samples.per_pixel() > 1 {
+        if self.options.rate == LightingRate::Pixel && self.samples.per_pixel() > 1 {
             let message = format!(
                 "one of {} samples of a pixel is lit, and the others get its light: edges are not smooth; --set rate=sample",
                 self.samples.per_pixel()
@@ -189,13 +189,13 @@ impl DrawsScene for Deferred {
         let stage = Stage { job: self, frame, viewport, lit, screen: Corners::of(frame, viewport) };
         let surfaces = stage.surfaces(gpu)?;
         let lit_runs = match self.options.method {
-            Method::Forward => stage.forward(&surfaces, gpu)?,
-            Method::Deferred => stage.deferred(&surfaces, gpu)?,
+            LightingMethod::Forward => stage.forward(&surfaces, gpu)?,
+            LightingMethod::Deferred => stage.deferred(&surfaces, gpu)?,
         };
         let image = stage.resolve(gpu)?.into_image();
         let bytes = match self.options.method {
-            Method::Forward => 0,
-            Method::Deferred => GBuffer::bytes(self.options.normals) * u64::from(samples),
+            LightingMethod::Forward => 0,
+            LightingMethod::Deferred => GBuffer::bytes(self.options.normals) * u64::from(samples),
         };
         let facts = Fact::all([
             (fact::point_lights, self.lights.len() as f64),
@@ -332,7 +332,7 @@ impl<'a> Stage<'a> {
     /// Lights the G-buffer.
     fn light(&self, buffer: &GBuffer, surfaces: &[Surfaced<'a>], gpu: &mut Gpu<'_>) -> Result<u64, JobError> {
         let DeferredOptions { lighting, rate, .. } = self.job.options;
-        let per_sample = rate == Rate::Sample;
+        let per_sample = rate == LightingRate::Sample;
         let (reader, rays) = (buffer.reader(per_sample), CameraRays::new(self.camera()));
         let Some(first) = surfaces.first() else { return Ok(0) };
         let (all, bindings) = (&self.job.lights[..], buffer.bindings());
@@ -396,6 +396,6 @@ pub(crate) const FLAGS: Flags = Flags {
 ///
 /// # Errors
 /// As [`Deferred::new`].
-pub fn job(options: &OptionSource, request: &Request<'_>) -> Result<Box<dyn Job>, LoadError> {
+pub fn job(options: &OptionSource, request: &JobRequest<'_>) -> Result<Box<dyn Job>, LoadError> {
     Ok(Box::new(Deferred::new(options.read()?, request.overrides, request.seed)?))
 }

@@ -20,7 +20,7 @@ use serde::{Deserialize, Serialize};
 use crate::material::{Lighting, LitPoint, PointLight, SurfaceShader};
 use crate::scene::Frame;
 
-pub use job::{Deferred, DeferredOptions, LightPass, Method, Rate};
+pub use job::{Deferred, DeferredOptions, LightPass, LightingMethod, LightingRate};
 pub(crate) use job::{FACTS, FLAGS, job};
 
 /// Format of normals and gloss.

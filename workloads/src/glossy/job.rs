@@ -8,10 +8,10 @@ use pipeline::{Camera, Cull, Draw, Geometry, Gpu, RasterPass, Rendered, SampleSp
 use serde::{Deserialize, Serialize};
 use warnings::{Code, Warning};
 
-use super::{Effect, Map, Receiver, ReceiverShader};
+use super::{GlossyEffect, Map, Receiver, ReceiverShader};
 use crate::error::LoadError;
 use crate::job::{
-    Drawn, DrawsScene, Fact, Flag, Flags, Job, JobError, JobOptions, OptionSource, Request, facts,
+    Drawn, DrawsScene, Fact, Flag, Flags, Job, JobError, JobOptions, JobRequest, OptionSource, facts,
 };
 use crate::material::Material;
 use crate::scene::{
@@ -132,8 +132,8 @@ impl Glossy {
         Ok(job)
     }
 
-    fn effect(&self) -> Effect {
-        self.options.index.map_or(Effect::Reflection, Effect::Refraction)
+    fn effect(&self) -> GlossyEffect {
+        self.options.index.map_or(GlossyEffect::Reflection, GlossyEffect::Refraction)
     }
 
     fn map(&self, frame: &Frame) -> Result<Map, LoadError> {
@@ -223,7 +223,7 @@ pub(crate) const FLAGS: Flags = Flags {
 ///
 /// # Errors
 /// As [`Glossy::new`].
-pub fn job(options: &OptionSource, request: &Request<'_>) -> Result<Box<dyn Job>, LoadError> {
+pub fn job(options: &OptionSource, request: &JobRequest<'_>) -> Result<Box<dyn Job>, LoadError> {
     Ok(Box::new(Glossy::new(options.read()?, request.overrides, request.seed)?))
 }
 

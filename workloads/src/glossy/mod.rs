@@ -5,7 +5,7 @@
 //! central ray comes from. Objects that touch the receiver are sharp, and far ones are blurred. One 4D pass
 //! makes the map, filtered by the resolve. The lens radius is the roughness.
 //!
-//! - [`Receiver`], [`Effect`]: the rectangle, and the camera position for it; [`ReceiverShader`]: its
+//! - [`Receiver`], [`GlossyEffect`]: the rectangle, and the camera position for it; [`ReceiverShader`]: its
 //!   shading.
 //! - [`Map`]: the map in [one pass](Map::one_pass), by [accumulation](Map::accumulated), and by
 //!   [rays](Map::by_rays), the brute-force reference.
@@ -24,7 +24,7 @@ use pipeline::{
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use crate::accumulation::{RayWork, Rays, SharedSamples, pinhole};
+use crate::accumulation::{RayCaster, RayWork, SharedSamples, pinhole};
 use crate::error::LoadError;
 use crate::job::JobError;
 use crate::scene::camera::CameraFrame;
@@ -62,7 +62,7 @@ impl Map {
     pub fn new(
         receiver: &Receiver,
         (eye, along): (DVec3, DVec3),
-        effect: Effect,
+        effect: GlossyEffect,
         radius: f64,
         rows: u32,
     ) -> Result<Self, LoadError> {
@@ -70,7 +70,7 @@ impl Map {
         let from = receiver.eye(eye, along, effect).ok_or_else(|| {
             refused("receiver", "the camera has to be above it and to look down on it".to_owned())
         })?;
-        let forward = if effect == Effect::Reflection { receiver.normal } else { -receiver.normal };
+        let forward = if effect == GlossyEffect::Reflection { receiver.normal } else { -receiver.normal };
         let up = receiver.right.cross(forward);
         let stand = CameraFrame { eye: from, right: receiver.right, up, forward };
         let to = receiver.centre - from;
@@ -168,7 +168,7 @@ impl Map {
     /// tables, and the work.
     pub fn by_rays(
         &self,
-        (rays, colours): (&Rays, &[Vec3]),
+        (rays, colours): (&RayCaster, &[Vec3]),
         tables: &[&dyn SampleSource],
         background: Vec3,
         lobe: Lobe,
@@ -230,7 +230,7 @@ pub struct Receiver {
 /// Reflection or refraction.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Effect {
+pub enum GlossyEffect {
     /// Reflection.
     Reflection,
     /// Refraction into a medium with this index.
@@ -251,12 +251,12 @@ impl Receiver {
     /// Camera position of the map (Figure 13): the viewer mirrored in the plane, or moved along the normal so
     /// that the ray `along`, refracted by Snell's law, comes straight from it. `None` if the viewer is not
     /// above the receiver, or the ray does not go down.
-    pub fn eye(&self, eye: DVec3, along: DVec3, effect: Effect) -> Option<DVec3> {
+    pub fn eye(&self, eye: DVec3, along: DVec3, effect: GlossyEffect) -> Option<DVec3> {
         let height = self.height(eye);
         if !(height > 0.0 && height.is_finite()) {
             return None;
         }
-        let Effect::Refraction(index) = effect else { return Some(eye - 2.0 * height * self.normal) };
+        let GlossyEffect::Refraction(index) = effect else { return Some(eye - 2.0 * height * self.normal) };
         let down = -along.dot(self.normal) / along.length();
         if !(down > 1e-6 && index > 0.0) {
             return None;
@@ -332,9 +332,9 @@ mod tests {
     #[test]
     fn the_mirrored_position_is_as_far_below() {
         let floor = Receiver::lying(DVec3::new(0.0, 1.0, 0.0), [1.0, 1.0]);
-        let eye = floor.eye(DVec3::new(2.0, 4.0, 1.0), DVec3::NEG_Y, Effect::Reflection);
+        let eye = floor.eye(DVec3::new(2.0, 4.0, 1.0), DVec3::NEG_Y, GlossyEffect::Reflection);
         assert_eq!(eye, Some(DVec3::new(2.0, -2.0, 1.0)));
-        assert_eq!(floor.eye(DVec3::ZERO, DVec3::NEG_Y, Effect::Reflection), None, "from below");
+        assert_eq!(floor.eye(DVec3::ZERO, DVec3::NEG_Y, GlossyEffect::Reflection), None, "from below");
     }
 
     /// Compares the central ray with Snell's law.
@@ -344,14 +344,14 @@ mod tests {
         for (along, index) in [(DVec3::new(0.6, -0.8, 0.0), 1.33), (DVec3::new(0.3, -0.2, 0.4), 1.5)] {
             let eye = DVec3::new(-1.0, 2.0, 0.5);
             let met = eye + along * (eye.y / -along.y);
-            let from = water.eye(eye, along, Effect::Refraction(index)).unwrap();
+            let from = water.eye(eye, along, GlossyEffect::Refraction(index)).unwrap();
             assert_eq!([from.x, from.z], [eye.x, eye.z], "it moves along the normal");
             let sine = |ray: DVec3| (1.0 - (ray.normalize().y).powi(2)).sqrt();
             assert!((sine(along) / sine(met - from) - index).abs() < 1e-9);
         }
-        let down = water.eye(DVec3::Y, DVec3::NEG_Y, Effect::Refraction(1.5)).unwrap();
+        let down = water.eye(DVec3::Y, DVec3::NEG_Y, GlossyEffect::Refraction(1.5)).unwrap();
         assert!((down.y - 1.5).abs() < 1e-9, "apparent depth");
-        assert_eq!(water.eye(DVec3::Y, DVec3::X, Effect::Refraction(1.5)), None);
+        assert_eq!(water.eye(DVec3::Y, DVec3::X, GlossyEffect::Refraction(1.5)), None);
     }
 
     /// Schlick 1994: at 60 degrees, (1 - 1/2)^5 = 1/32 of the missing share is added to the reflectance at

@@ -333,7 +333,7 @@ impl JobError {
 
 /// Parameters of a job besides its own options.
 #[derive(Clone, Copy, Debug)]
-pub struct Request<'a> {
+pub struct JobRequest<'a> {
     /// Changes to the settings.
     pub overrides: &'a Overrides,
     /// Seed of all random numbers.

@@ -36,7 +36,7 @@ pub struct Need {
     pub option: &'static str,
     /// The option that makes the choice.
     pub choice: &'static str,
-    /// Its values with which `option` has an effect, as they are set; `none` where it is left out.
+    /// Values of `choice` with which `option` has an effect, as they are set; `none` where it is left out.
     pub values: &'static [&'static str],
 }
 

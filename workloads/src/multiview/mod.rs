@@ -4,9 +4,9 @@
 //! value serves all views, the whole lens and the shutter, through the shading cache.
 //!
 //! - [`Layout`]: views on the camera line, as two small lenses or with overlapping box filters.
-//! - [`Rig`]: all views in [one pass](Rig::one_pass), and for comparison [view by view](Rig::view_by_view),
-//!   by [accumulation](Rig::accumulated), and with [separate cameras](Rig::own_cameras), the ground truth of
-//!   shading.
+//! - [`MultiviewRig`]: all views in [one pass](MultiviewRig::one_pass), and for comparison [view by
+//!   view](MultiviewRig::view_by_view), by [accumulation](MultiviewRig::accumulated), and with [separate
+//!   cameras](MultiviewRig::own_cameras), the ground truth of shading.
 //! - [`Panel`]: interlacing for a display behind lenticular lenses.
 //! - [`job()`]: the workload.
 
@@ -20,12 +20,12 @@ use warnings::{Code, Warning};
 
 use crate::error::LoadError;
 use crate::job::{
-    Drawn, DrawsScene, Fact, Flag, Flags, Job, JobError, JobOptions, Need, OptionSource, Request, facts,
+    Drawn, DrawsScene, Fact, Flag, Flags, Job, JobError, JobOptions, JobRequest, Need, OptionSource, facts,
 };
 use crate::scene::{Frame, Overrides, Scene, Settings};
 
 pub use layout::{Layout, Panel};
-pub use rig::{Rig, Target, Views};
+pub use rig::{MultiviewRig, ViewTarget, Views};
 
 /// Arrangement of the views in the image.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -139,13 +139,13 @@ impl MultiView {
         Ok(job)
     }
 
-    fn rig(&self, frame: &Frame) -> Result<Rig, LoadError> {
+    fn rig(&self, frame: &Frame) -> Result<MultiviewRig, LoadError> {
         let lens = frame.camera.lens().map(|lens| lens.focus());
         let focus = self.options.focus.or(lens).ok_or_else(|| {
             let message = "the scene has no lens and so no depth at which views agree: give that depth with --focus or `--set focus=`";
             LoadError::Setting { setting: "focus", message: message.to_owned() }
         })?;
-        Rig::new(&frame.camera, focus, &self.options.layout(), self.settings.samples, self.seed)
+        MultiviewRig::new(&frame.camera, focus, &self.options.layout(), self.settings.samples, self.seed)
     }
 
     fn shown(&self, views: &Views) -> Vec<glam::Vec3> {
@@ -172,7 +172,7 @@ impl MultiView {
     }
 
     /// Warns about view-dependent materials: they are shaded for the middle of the line only.
-    fn angle_warning(&self, rig: &Rig) -> Option<Warning> {
+    fn angle_warning(&self, rig: &MultiviewRig) -> Option<Warning> {
         let angle = rig.degrees();
         let shiny = self.scene.materials().iter().any(|material| !material.unlit);
         (shiny && angle > MAX_VIEW_ANGLE_DEG).then(|| {
@@ -205,7 +205,7 @@ impl DrawsScene for MultiView {
         let draws = frame.draws(&self.scene)?;
         let rig = self.rig(frame).map_err(JobError::setting)?;
         let (places, background) = (self.places(), self.scene.background());
-        let to = Target { viewport: self.view, spec: gpu.spec(), background, places: &places };
+        let to = ViewTarget { viewport: self.view, spec: gpu.spec(), background, places: &places };
         let views = if self.options.view_by_view {
             rig.view_by_view(&draws, &to, gpu)?
         } else {
@@ -228,13 +228,13 @@ impl DrawsScene for MultiView {
 
 /// Shader executions of `views`, relative to one pass with an infinite cache.
 fn runs_over_infinite_cache(
-    rig: &Rig,
+    rig: &MultiviewRig,
     draws: &[Draw<'_>],
-    to: &Target<'_>,
+    to: &ViewTarget<'_>,
     views: &Views,
 ) -> Result<f64, JobError> {
     let infinite = PipelineSpec { shading_cache: INFINITE_CACHE, ..*to.spec };
-    let to = Target { spec: &infinite, ..*to };
+    let to = ViewTarget { spec: &infinite, ..*to };
     let least =
         rig.one_pass(draws, &to, &mut Gpu::without_packets(&infinite)?)?.counts[Event::PixelInvocations];
     Ok(views.counts[Event::PixelInvocations] as f64 / least.max(1) as f64)
@@ -271,6 +271,6 @@ pub(crate) const FLAGS: Flags = Flags {
 ///
 /// # Errors
 /// As [`MultiView::new`].
-pub fn job(options: &OptionSource, request: &Request<'_>) -> Result<Box<dyn Job>, LoadError> {
+pub fn job(options: &OptionSource, request: &JobRequest<'_>) -> Result<Box<dyn Job>, LoadError> {
     Ok(Box::new(MultiView::new(options.read()?, request.overrides, request.seed)?))
 }

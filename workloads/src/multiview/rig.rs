@@ -17,7 +17,7 @@ use crate::job::JobError;
 
 /// Render target of the views.
 #[derive(Clone, Copy)]
-pub struct Target<'a> {
+pub struct ViewTarget<'a> {
     /// Size of each view.
     pub viewport: Viewport,
     /// The hardware.
@@ -41,7 +41,7 @@ pub struct Views {
 
 /// A camera with a lens as wide as the camera line, and the samples of its views.
 #[derive(Clone, Debug)]
-pub struct Rig {
+pub struct MultiviewRig {
     pub(super) camera: Camera,
     pub(super) layout: Layout,
     pub(super) table: SampleTable,
@@ -51,7 +51,7 @@ pub struct Rig {
 /// Largest half length of the line relative to the depth of zero disparity; wider views have no common scene.
 const MAX_RADIUS_PER_FOCUS: f64 = 100.0;
 
-impl Rig {
+impl MultiviewRig {
     /// Makes a rig of `layout` at `camera`, with all views sharp at depth `focus`, and `samples` per pixel
     /// and view.
     ///
@@ -114,7 +114,7 @@ impl Rig {
     pub fn one_pass(
         &self,
         draws: &[Draw<'_>],
-        to: &Target<'_>,
+        to: &ViewTarget<'_>,
         gpu: &mut Gpu<'_>,
     ) -> Result<Views, JobError> {
         let settings = settings(to, &self.table);
@@ -135,7 +135,7 @@ impl Rig {
         &self,
         view: usize,
         draws: &[Draw<'_>],
-        to: &Target<'_>,
+        to: &ViewTarget<'_>,
         gpu: &mut Gpu<'_>,
     ) -> Result<Rendered, JobError> {
         let run = self.runs.get(view).cloned().unwrap_or(0..1);
@@ -152,7 +152,7 @@ impl Rig {
     pub fn view_by_view(
         &self,
         draws: &[Draw<'_>],
-        to: &Target<'_>,
+        to: &ViewTarget<'_>,
         gpu: &mut Gpu<'_>,
     ) -> Result<Views, JobError> {
         let draws = gpu.resident(draws);
@@ -173,7 +173,7 @@ impl Views {
     }
 }
 
-pub(super) fn settings<'a>(to: &Target<'a>, samples: &'a dyn SampleSource) -> Settings<'a> {
+pub(super) fn settings<'a>(to: &ViewTarget<'a>, samples: &'a dyn SampleSource) -> Settings<'a> {
     Settings { spec: to.spec, viewport: to.viewport, samples, background: to.background }
 }
 
@@ -218,7 +218,7 @@ impl SampleSource for OwnLens<'_> {
     }
 }
 
-impl Rig {
+impl MultiviewRig {
     /// Accumulation buffering (Haeberli and Akeley 1990): one pinhole pass of still geometry per sample of
     /// each view. All pixels share the samples of lens and time. Samples that views share are rendered once.
     ///
@@ -227,7 +227,7 @@ impl Rig {
     pub fn accumulated(
         &self,
         draws: &[Draw<'_>],
-        to: &Target<'_>,
+        to: &ViewTarget<'_>,
         gpu: &mut Gpu<'_>,
     ) -> Result<Views, JobError> {
         // The samples of one pixel of the table serve all pixels.
@@ -257,9 +257,9 @@ impl Rig {
     ///
     /// # Errors
     /// [`JobError`] if the hardware cannot be built.
-    pub fn own_cameras(&self, draws: &[Draw<'_>], to: &Target<'_>) -> Result<Vec<Vec<Vec3>>, JobError> {
+    pub fn own_cameras(&self, draws: &[Draw<'_>], to: &ViewTarget<'_>) -> Result<Vec<Vec<Vec3>>, JobError> {
         let spec = PipelineSpec { shading: Shading::PerSample, ..*to.spec };
-        let to = Target { spec: &spec, ..*to };
+        let to = ViewTarget { spec: &spec, ..*to };
         let focus = self.camera.lens().map_or(1.0, |lens| lens.focus());
         let radius = self.layout.radius();
         let along = match self.layout.overlap {

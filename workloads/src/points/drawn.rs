@@ -51,7 +51,7 @@ pub(super) struct Lattice {
 /// Candidates that were kept, in pseudo-random order.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Kept {
-    /// Their positions.
+    /// Positions of the candidates.
     pub points: Vec<[f64; AXES]>,
     /// Candidates that were made, over all simploids and tiles.
     pub candidates: u64,

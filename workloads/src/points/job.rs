@@ -21,11 +21,11 @@ use super::poisson::{
     poisson_disk_drawn,
 };
 use super::volume::{Blurred, Torus, Volume, fill};
-use super::white::{Named, columns_for};
+use super::white::{NamedDensity, columns_for};
 use super::{DrawnNoise, NoiseSpec, draw_noise};
 use crate::error::LoadError;
 use crate::job::{
-    Drawn, Draws, Fact, Flag, Flags, Job, JobError, JobOptions, Need, OptionSource, Request, facts,
+    Drawn, Draws, Fact, Flag, Flags, Job, JobError, JobOptions, JobRequest, Need, OptionSource, facts,
 };
 use crate::scene::Settings;
 
@@ -124,7 +124,7 @@ const MIN_RADIUS_3D: f64 = 0.03;
 ///
 /// # Errors
 /// [`LoadError::Setting`] for an option out of range.
-pub(crate) fn job(options: &OptionSource, request: &Request<'_>) -> Result<Box<dyn Job>, LoadError> {
+pub(crate) fn job(options: &OptionSource, request: &JobRequest<'_>) -> Result<Box<dyn Job>, LoadError> {
     let mut options: PointOptions = options.read()?;
     let refused = |setting, message: String| Err(LoadError::Setting { setting, message });
     let known = options.points.dimensions();
@@ -335,7 +335,7 @@ impl Sampling {
 
     fn noise<const D: usize>(&self, seed: u64, gpu: &mut Gpu<'_>) -> Result<Drawn, JobError> {
         let spec = NoiseSpec { count: self.options.count, seed, across: columns_for(D) };
-        let found: DrawnNoise<D> = draw_noise(&Named::Gauss, &spec, gpu).map_err(JobError::setting)?;
+        let found: DrawnNoise<D> = draw_noise(&NamedDensity::Gauss, &spec, gpu).map_err(JobError::setting)?;
         let facts = Fact::all([
             (fact::points, found.points.len() as f64),
             (fact::candidates, found.candidates as f64),
@@ -405,7 +405,7 @@ mod tests {
     fn made(set: &[(&str, &str)], size: (u32, u32)) -> Result<Box<dyn Job>, String> {
         let set = set.iter().map(|(name, value)| ((*name).to_owned(), (*value).to_owned())).collect();
         let overrides = Overrides { size: Some(size), ..Overrides::default() };
-        job(&OptionSource { file: None, set }, &Request { overrides: &overrides, seed: 1 })
+        job(&OptionSource { file: None, set }, &JobRequest { overrides: &overrides, seed: 1 })
             .map_err(|error| error.to_string())
     }
 

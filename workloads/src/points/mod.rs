@@ -224,7 +224,7 @@ pub fn draw_noise<const D: usize>(
 mod tests {
     use super::poisson::{Domain, PoissonSpec, Spacing, poisson_disk};
     use super::quality::chi_square;
-    use super::white::{Named, counts};
+    use super::white::{NamedDensity, counts};
     use super::*;
     use crate::job::testing::hardware;
 
@@ -250,18 +250,19 @@ mod tests {
         assert!(thin_regions_warning(0, 0).is_none());
     }
 
-    fn drawn<const D: usize>(density: Named, spec: &NoiseSpec) -> DrawnNoise<D> {
+    fn drawn<const D: usize>(density: NamedDensity, spec: &NoiseSpec) -> DrawnNoise<D> {
         let hardware = hardware();
         draw_noise(&density, spec, &mut Gpu::without_packets(&hardware).unwrap()).unwrap()
     }
 
-    fn on_host<const D: usize>(density: &Named, spec: &NoiseSpec) -> Vec<[f64; D]> {
+    fn on_host<const D: usize>(density: &NamedDensity, spec: &NoiseSpec) -> Vec<[f64; D]> {
         let lifted: Lifted<D> = Lifted::new(density, spec).unwrap();
         Lifted::<D>::projected(&drawn::on_host(&lifted.cells, &lifted.lattice, &lifted))
     }
 
     fn same<const D: usize>(across: u32, cells: u64) {
-        for density in [Named::Constant, Named::Ramp, Named::Gauss, Named::Waves] {
+        for density in [NamedDensity::Constant, NamedDensity::Ramp, NamedDensity::Gauss, NamedDensity::Waves]
+        {
             let spec = NoiseSpec { count: 3000.0, seed: 7, across };
             let found = drawn::<D>(density, &spec);
             assert_eq!(found.points, on_host::<D>(&density, &spec), "{D} {density:?}");
@@ -291,10 +292,10 @@ mod tests {
         let spec = NoiseSpec { count: 500.0, seed: 1, across: 8 };
         let with = |threads: usize| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-            pool.install(|| drawn::<2>(Named::Gauss, &spec))
+            pool.install(|| drawn::<2>(NamedDensity::Gauss, &spec))
         };
         assert_eq!(with(1), with(3));
-        assert_ne!(with(1).points, drawn::<2>(Named::Gauss, &NoiseSpec { seed: 2, ..spec }).points);
+        assert_ne!(with(1).points, drawn::<2>(NamedDensity::Gauss, &NoiseSpec { seed: 2, ..spec }).points);
     }
 
     /// Neighbouring seeds once had the same cells in another order.
@@ -303,7 +304,7 @@ mod tests {
         let places = |seed| {
             let spec = NoiseSpec { count: 2000.0, seed, across: 16 };
             let within = |point: &[f64; 1]| ((point[0] * 16.0).fract() * 1e10) as u64;
-            let points = drawn::<1>(Named::Constant, &spec).points;
+            let points = drawn::<1>(NamedDensity::Constant, &spec).points;
             points.iter().map(within).collect::<std::collections::HashSet<u64>>()
         };
         assert!(places(2).len() > 1000);
@@ -316,7 +317,10 @@ mod tests {
         let mut gpu = Gpu::without_packets(&hardware).unwrap();
         for across in [0, 33] {
             let spec = NoiseSpec { count: 10.0, seed: 1, across };
-            assert_eq!(draw_noise::<4>(&Named::Gauss, &spec, &mut gpu), Err(WhiteError::Columns(across)));
+            assert_eq!(
+                draw_noise::<4>(&NamedDensity::Gauss, &spec, &mut gpu),
+                Err(WhiteError::Columns(across))
+            );
         }
     }
 }

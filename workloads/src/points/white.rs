@@ -217,7 +217,7 @@ pub trait Shaded<const D: usize>: Density<D> {
 /// Named densities of any dimension.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Named {
+pub enum NamedDensity {
     /// Constant.
     Constant,
     /// Mean of the coordinates.
@@ -240,7 +240,7 @@ fn wave(lane: &Lane, x: f64) -> f64 {
     lane.madd(0.5, lane.cos(lane.mul(TAU * WAVES, x)), 0.5)
 }
 
-impl Named {
+impl NamedDensity {
     /// All densities with their names.
     pub const ALL: [(&'static str, Self); 4] =
         [("constant", Self::Constant), ("ramp", Self::Ramp), ("gauss", Self::Gauss), ("waves", Self::Waves)];
@@ -251,7 +251,7 @@ impl Named {
     }
 }
 
-impl<const D: usize> Density<D> for Named {
+impl<const D: usize> Density<D> for NamedDensity {
     fn at(&self, point: &[f64; D]) -> f64 {
         self.on(&Lane::default(), point)
     }
@@ -273,7 +273,7 @@ impl<const D: usize> Density<D> for Named {
     }
 }
 
-impl<const D: usize> Shaded<D> for Named {
+impl<const D: usize> Shaded<D> for NamedDensity {
     fn on(&self, lane: &Lane, point: &[f64; D]) -> f64 {
         match self {
             Self::Constant => 1.0,
@@ -377,7 +377,7 @@ mod tests {
     fn bounds_are_conservative_in_every_dimension() {
         fn holds<const D: usize>() {
             let stream = Stream::new(1, D as u64);
-            for (name, density) in Named::ALL {
+            for (name, density) in NamedDensity::ALL {
                 for number in 0..2000 {
                     let at = |k: usize| stream.unit(number * 12 + k as u64);
                     let low: [f64; D] = std::array::from_fn(|k| 0.9 * at(k));
@@ -399,7 +399,7 @@ mod tests {
 
     #[test]
     fn points_follow_every_density_in_one_to_four_dimensions() {
-        for (name, density) in Named::ALL {
+        for (name, density) in NamedDensity::ALL {
             let fits = [
                 fit::<1>(&density, &spec(20_000, 1), 50),
                 fit::<2>(&density, &spec(20_000, 1), 20),
@@ -414,22 +414,24 @@ mod tests {
 
     #[test]
     fn another_density_is_rejected() {
-        let points = white_noise::<2>(&Named::Ramp, &spec(20_000, 1)).unwrap().points;
-        let wrong = chi_square(&counts(&points, 20), &shares::<2>(&Named::Constant, 20, 4));
+        let points = white_noise::<2>(&NamedDensity::Ramp, &spec(20_000, 1)).unwrap().points;
+        let wrong = chi_square(&counts(&points, 20), &shares::<2>(&NamedDensity::Constant, 20, 4));
         assert!(wrong.p < 1e-9, "{wrong:?}");
     }
 
     #[test]
     fn low_discrepancy_fits_too_well() {
         let even = WhiteSpec { numbers: Numbers::LowDiscrepancy, across: 1, ..spec(20_000, 1) };
-        assert!(fit::<1>(&Named::Constant, &even, 50).p > 0.999);
-        assert!(fit::<2>(&Named::Constant, &even, 20).p > 0.999);
+        assert!(fit::<1>(&NamedDensity::Constant, &even, 50).p > 0.999);
+        assert!(fit::<2>(&NamedDensity::Constant, &even, 20).p > 0.999);
     }
 
     #[test]
     fn columns_save_candidates() {
-        let plain = white_noise::<2>(&Named::Gauss, &WhiteSpec { across: 1, ..spec(5000, 1) }).unwrap();
-        let bounded = white_noise::<2>(&Named::Gauss, &WhiteSpec { across: 64, ..spec(5000, 1) }).unwrap();
+        let plain =
+            white_noise::<2>(&NamedDensity::Gauss, &WhiteSpec { across: 1, ..spec(5000, 1) }).unwrap();
+        let bounded =
+            white_noise::<2>(&NamedDensity::Gauss, &WhiteSpec { across: 64, ..spec(5000, 1) }).unwrap();
         // Without columns the share of accepted candidates is 2 pi 0.15^2; with them nearly all are accepted.
         let share = 5000.0 / plain.candidates as f64;
         assert!((share - 0.1413).abs() < 0.01, "{share}");
@@ -440,7 +442,7 @@ mod tests {
     fn the_result_does_not_depend_on_threads() {
         let with = |threads: usize| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-            pool.install(|| white_noise::<3>(&Named::Waves, &spec(30_000, 5)).unwrap())
+            pool.install(|| white_noise::<3>(&NamedDensity::Waves, &spec(30_000, 5)).unwrap())
         };
         assert_eq!(with(1), with(3));
     }
@@ -453,6 +455,6 @@ mod tests {
         let points = white_noise::<2>(&half, &spec(1000, 1)).unwrap().points;
         assert!(points.iter().all(|[x, _]| *x >= 0.5));
         let wide = WhiteSpec { across: 4097, ..spec(1, 1) };
-        assert_eq!(white_noise::<2>(&Named::Ramp, &wide), Err(WhiteError::Columns(4097)));
+        assert_eq!(white_noise::<2>(&NamedDensity::Ramp, &wide), Err(WhiteError::Columns(4097)));
     }
 }

@@ -315,7 +315,7 @@ pub enum Property {
 
 /// An animation clip: tracks that play together in a loop.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Clip {
+pub struct AnimationClip {
     /// Name; `clip 0` and so on if the file has none.
     pub name: String,
     /// Time in seconds of the last key of any track, where the clip repeats.
@@ -324,7 +324,7 @@ pub struct Clip {
     pub tracks: Vec<(usize, Property, Track)>,
 }
 
-impl Clip {
+impl AnimationClip {
     /// Index of the clip with the name or the number `wanted`.
     pub(crate) fn find(clips: &[Self], wanted: &str) -> Result<usize, LoadError> {
         let by_name = clips.iter().position(|clip| clip.name == wanted);

@@ -256,7 +256,7 @@ impl Scene {
     }
 
     fn clip_infos(&self) -> Vec<ClipInfo> {
-        let of = |clip: &super::Clip| ClipInfo {
+        let of = |clip: &super::AnimationClip| ClipInfo {
             name: clip.name.clone(),
             duration_s: clip.duration_s,
             tracks: clip.tracks.len(),

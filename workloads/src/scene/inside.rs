@@ -372,8 +372,8 @@ mod tests {
     #[test]
     fn a_solid_is_seen_from_outside() {
         assert_eq!(Inside::find(sides(LOW, HIGH, false, false), false), None);
-        let asked = Inside::find(sides(LOW, HIGH, false, false), true).unwrap();
-        assert!(!asked.is_room && asked.enclosed == 0.0, "{asked:?}");
+        let found = Inside::find(sides(LOW, HIGH, false, false), true).unwrap();
+        assert!(!found.is_room && found.enclosed == 0.0, "{found:?}");
     }
 
     #[test]

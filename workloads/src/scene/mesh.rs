@@ -20,7 +20,7 @@ pub enum Normals {
 
 /// One morph target: displacements of the vertices at weight one. Either list may be empty.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Target {
+pub struct MorphTarget {
     /// Displacements in the mesh's units.
     pub positions: Vec<Vec3>,
     /// Changes of the normals.
@@ -34,7 +34,7 @@ pub struct Influences {
     pub per_vertex: usize,
     /// Indices into the skin's joints, `per_vertex` for each vertex.
     pub joints: Vec<u16>,
-    /// Their weights, adding up to one for each vertex.
+    /// Weights of the joints, adding up to one for each vertex.
     pub weights: Vec<f32>,
 }
 
@@ -56,7 +56,7 @@ pub struct Mesh {
     /// Index of the material.
     pub material: usize,
     /// Morph targets.
-    pub targets: Vec<Target>,
+    pub targets: Vec<MorphTarget>,
     /// Default weights of the targets, without weights of a node or track.
     pub weights: Vec<f64>,
     /// Joints and weights of each vertex, for skinned meshes.
@@ -148,7 +148,7 @@ impl Mesh {
 
     /// The vertices `used` with `triangles` over them.
     fn gathered(&self, used: &[u32], triangles: Vec<[u32; 3]>) -> Self {
-        let target = |target: &Target| Target {
+        let target = |target: &MorphTarget| MorphTarget {
             positions: gathered(&target.positions, used),
             normals: gathered(&target.normals, used),
         };

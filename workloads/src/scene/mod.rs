@@ -19,13 +19,13 @@ pub(crate) use camera_spec::Wrong;
 pub use camera_spec::{CameraKey, CameraSpec, InterpolationSpec};
 pub use camera_used::{CameraSource, CameraUsed, OwnCamera};
 pub use frame::{Frame, FrameError, FrameMesh, NearSpace};
-pub use graph::{Channels, Clip, Graph, Local, Motion, Node, Property, Spin, Trs, world_poses};
+pub use graph::{AnimationClip, Channels, Graph, Local, Motion, Node, Property, Spin, Trs, world_poses};
 pub use info::{
     CameraInfo, ClipInfo, LensInfo, LightInfo, MaterialInfo, MeshInfo, SceneInfo, SettingsInfo, TextureInfo,
 };
 pub(crate) use measure::lens_leaves_view;
 pub(crate) use mesh::Bounds;
-pub use mesh::{Influences, Instance, Mesh, Normals, Skin, Target};
+pub use mesh::{Influences, Instance, Mesh, MorphTarget, Normals, Skin};
 pub use settings::{Overrides, Settings};
 pub use track::{Instant, Interpolation, Track};
 pub(crate) use track::{rotation, unit_quat};
@@ -49,7 +49,7 @@ use measure::Placed;
 pub struct Scene {
     name: String,
     graph: Graph,
-    clips: Vec<Clip>,
+    clips: Vec<AnimationClip>,
     /// The playing clip, if there are any.
     playing: Option<usize>,
     /// Cameras of the scene's file.
@@ -79,7 +79,7 @@ pub struct Scene {
     centre: DVec3,
 }
 
-/// Vertices and triangles of all instances together: a small file that asks for more is broken.
+/// Vertices and triangles of all instances together: a small file that requests more is broken.
 const MAX_ELEMENTS: usize = 100_000_000;
 
 /// The automatic near depth, in depths of the camera's target.
@@ -191,7 +191,7 @@ impl Scene {
         let lens = self.choose_camera(overrides)?;
         self.settings = self.settings.with(&lens.over(overrides))?;
         if let Some(wanted) = &overrides.clip {
-            let index = Clip::find(&self.clips, wanted)?;
+            let index = AnimationClip::find(&self.clips, wanted)?;
             self.clips[index].play(&mut self.graph.nodes);
             self.playing = Some(index);
             self.room = None;
@@ -367,7 +367,7 @@ pub struct Parts {
     /// Shapes, materials and their hierarchy.
     pub graph: Graph,
     /// Animation clips of which one at a time is played.
-    pub clips: Vec<Clip>,
+    pub clips: Vec<AnimationClip>,
     /// Default camera.
     pub camera: SceneCamera,
     /// Cameras to choose from by name or number. If empty, `camera` is one, unless it is placed automatically.

@@ -124,16 +124,14 @@ fn spread(bits: u64) -> u64 {
 
 #[cfg(test)]
 mod tests {
+    use pipeline::random::SplitMix;
+
     use super::*;
 
-    /// Triangles strewn by a simple recurrence.
+    /// Triangles strewn at random.
     fn strewn(count: usize) -> Vec<[DVec3; 3]> {
-        let mut state = 1_u64;
-        let mut next = || {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            (state >> 11) as f64 / (1_u64 << 53) as f64
-        };
-        let mut point = |scale: f64| DVec3::new(next() - 0.5, next() - 0.5, next() - 0.5) * scale;
+        let mut random = SplitMix::new(1);
+        let mut point = |scale: f64| DVec3::from_array([0; 3].map(|_| random.next_unit() - 0.5)) * scale;
         (0..count)
             .map(|_| {
                 let at = point(4.0);

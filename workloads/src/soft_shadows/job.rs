@@ -11,11 +11,11 @@ use serde::{Deserialize, Serialize};
 use warnings::{Code, Warning};
 
 use super::shade::{Shadows, VisibleTriangles, World, look_ups};
-use super::{AreaLight, LightSpec, Method, SceneView, ShadowMap};
+use super::{AreaLight, LightSpec, SceneView, ShadowMap, ShadowMethod};
 use crate::accumulation::SharedSamples;
 use crate::error::LoadError;
 use crate::job::{
-    Drawn, DrawsScene, Fact, Flag, Flags, Job, JobError, JobOptions, OptionSource, Request, facts,
+    Drawn, DrawsScene, Fact, Flag, Flags, Job, JobError, JobOptions, JobRequest, OptionSource, facts,
 };
 use crate::material::{Alpha, Material};
 use crate::scene::{
@@ -100,8 +100,8 @@ impl SoftShadows {
         Ok(Self { scene, light, set, options })
     }
 
-    fn method(&self) -> Method {
-        if self.options.accumulate { Method::Accumulation } else { Method::OnePass }
+    fn method(&self) -> ShadowMethod {
+        if self.options.accumulate { ShadowMethod::Accumulation } else { ShadowMethod::OnePass }
     }
 
     /// Number of passes for the map.
@@ -224,7 +224,7 @@ pub(crate) const FLAGS: Flags = Flags {
 ///
 /// # Errors
 /// As [`SoftShadows::new`].
-pub fn job(options: &OptionSource, request: &Request<'_>) -> Result<Box<dyn Job>, LoadError> {
+pub fn job(options: &OptionSource, request: &JobRequest<'_>) -> Result<Box<dyn Job>, LoadError> {
     Ok(Box::new(SoftShadows::new(options.read()?, request.overrides, request.seed)?))
 }
 

@@ -2,7 +2,7 @@
 //!
 //! The lens of the light's camera is the area of the light, focused at infinity. All texels share a small
 //! fixed set of light and time samples. So the map is an array of ordinary shadow maps, one per `(u, v, t)`.
-//! It is made in one pass ([`Method::OnePass`]) or in one pass per sample ([`Method::Accumulation`]). The
+//! It is made in one pass ([`ShadowMethod::OnePass`]) or in one pass per sample ([`ShadowMethod::Accumulation`]). The
 //! shading pass uses the same set, and each of its samples reads the map of its own `(u, v, t)`
 //! ([`World::image`]).
 //!
@@ -176,7 +176,7 @@ impl ShadowMap {
         draws: &[Draw<'_>],
         side: u32,
         set: &SharedSamples,
-        method: Method,
+        method: ShadowMethod,
         gpu: &mut Gpu<'_>,
     ) -> Result<Self, JobError> {
         let viewport = Viewport::new(side, side).filter(|_| side.is_multiple_of(2));
@@ -241,7 +241,7 @@ impl ShadowMap {
 
 /// Rendering of the samples of a set.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Method {
+pub enum ShadowMethod {
     /// All in one 5D pass.
     OnePass,
     /// Each in its own pass, with still geometry and a pinhole.
@@ -276,7 +276,7 @@ pub fn depth_pass(
     view: &SceneView<'_>,
     viewport: Viewport,
     set: &SharedSamples,
-    method: Method,
+    method: ShadowMethod,
     gpu: &mut Gpu<'_>,
 ) -> Result<DepthPass, JobError> {
     let passes = in_passes(view, (viewport, set, method), gpu, |view, samples, gpu| {
@@ -302,12 +302,12 @@ pub fn depth_pass(
 /// Draws `view` at the samples of the set by `draw`: all at once, or each in a pass of its own with still geometry.
 fn in_passes<T>(
     &SceneView { camera, draws }: &SceneView<'_>,
-    (viewport, set, method): (Viewport, &SharedSamples, Method),
+    (viewport, set, method): (Viewport, &SharedSamples, ShadowMethod),
     gpu: &mut Gpu<'_>,
     mut draw: impl FnMut(&SceneView<'_>, &SharedSamples, &mut Gpu<'_>) -> Result<T, JobError>,
 ) -> Result<Vec<T>, JobError> {
     let draws = gpu.resident(draws);
-    if method == Method::OnePass {
+    if method == ShadowMethod::OnePass {
         return Ok(vec![draw(&SceneView { camera, draws: &draws }, set, gpu)?]);
     }
     let one = |(index, at): (usize, &Sample)| {

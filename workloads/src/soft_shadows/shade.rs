@@ -16,8 +16,8 @@ use pipeline::{
 };
 use rayon::prelude::*;
 
-use super::{AreaLight, DEPTH_BYTES, Method, SceneView, ShadowMap, in_passes};
-use crate::accumulation::{Face, RayWork, Rays, SharedSamples};
+use super::{AreaLight, DEPTH_BYTES, SceneView, ShadowMap, ShadowMethod, in_passes};
+use crate::accumulation::{Face, RayCaster, RayWork, SharedSamples};
 use crate::job::JobError;
 
 /// Bytes of the reflectance of a draw.
@@ -53,7 +53,7 @@ pub struct World<'a> {
     pub albedos: &'a [Vec3],
     /// Linear RGB radiance of the background.
     pub background: Vec3,
-    rays: Rays,
+    rays: RayCaster,
     draws: &'a [Draw<'a>],
     /// First triangle of each draw.
     first: Vec<u32>,
@@ -85,7 +85,7 @@ impl<'a> World<'a> {
         background: Vec3,
     ) -> Self {
         let SceneView { camera, draws } = *view;
-        let (projection, rays) = (Projection::new(camera, viewport), Rays::new(draws));
+        let (projection, rays) = (Projection::new(camera, viewport), RayCaster::new(draws));
         let first = draws.iter().scan(0, |next, draw| {
             let first = *next;
             *next += draw.geometry.triangles().len() as u32;
@@ -332,7 +332,7 @@ impl VisibleTriangles {
         view: &SceneView<'_>,
         viewport: Viewport,
         set: &SharedSamples,
-        method: Method,
+        method: ShadowMethod,
         gpu: &mut Gpu<'_>,
     ) -> Result<Self, JobError> {
         let triangles: usize = view.draws.iter().map(|draw| draw.geometry.triangles().len()).sum();

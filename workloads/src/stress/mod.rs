@@ -13,8 +13,8 @@ use std::ops::Range;
 
 use glam::{Affine3A, DVec2, DVec3};
 use pipeline::geometry::Projection;
-use pipeline::random::{mix, unit};
-use pipeline::sample_test::{Hits, Target, test_run};
+use pipeline::random::{SplitMix, mix};
+use pipeline::sample_test::{Hits, StoredSamples, test_run};
 use pipeline::sampling::{SampleSource, SampleTableError, TileSamples};
 use pipeline::setup::{SetupResult, Triangle, set_up};
 use pipeline::traversal::{Box5, TileRect};
@@ -196,7 +196,7 @@ pub fn within_bounds(
         let rect = TileRect::new(viewport, origin, SIDE_PX);
         samples.fill(source, viewport, &projection.shear, origin, SIDE_PX);
         let (mut depth, mut owner) = (vec![f32::INFINITY; samples.len], vec![u32::MAX; samples.len]);
-        let mut target = Target { depth: &mut depth, triangle: &mut owner };
+        let mut target = StoredSamples { depth: &mut depth, triangle: &mut owner };
         for triangle in &triangles {
             let Some(within) = bound(triangle, &rect) else { continue };
             hits.clear();
@@ -210,18 +210,11 @@ pub fn within_bounds(
     seen
 }
 
-/// Uniform random numbers from a hash of the seed and a counter.
-#[derive(Clone, Copy, Debug)]
-struct Rng {
-    seed: u64,
-    drawn: u64,
-}
-
 /// A scene under construction. The camera looks along z, with a field of view of 90 degrees, from one unit
 /// before everything.
 struct SceneBuilder {
     pub size: Size,
-    rng: Rng,
+    random: SplitMix,
     scene: StressScene,
 }
 
@@ -233,7 +226,7 @@ impl SceneBuilder {
         let camera = Camera::new(Affine3A::IDENTITY, 1.0, NEAR as f32)?;
         let (open, close, triangles) = (Vec::new(), Vec::new(), Vec::new());
         let scene = StressScene { camera, viewport, samples, open, close, triangles };
-        Ok(Self { size, rng: Rng { seed: mix(seed), drawn: 0 }, scene })
+        Ok(Self { size, random: SplitMix::new(mix(seed)), scene })
     }
 
     pub fn finish(self) -> StressScene {
@@ -287,7 +280,7 @@ impl SceneBuilder {
 
     /// Random number between `low` and `high`.
     pub fn between(&mut self, low: f64, high: f64) -> f64 {
-        low + (high - low) * self.rng.next()
+        low + (high - low) * self.random.next_unit()
     }
 
     /// Random number between `low` and `high`, uniform in its logarithm.
@@ -333,14 +326,6 @@ impl SceneBuilder {
     /// Adds a triangle of existing vertices.
     pub fn face(&mut self, corners: [u32; 3]) {
         self.scene.triangles.push(corners);
-    }
-}
-
-impl Rng {
-    fn next(&mut self) -> f64 {
-        self.drawn += 1;
-        let word = mix(self.seed.wrapping_add(self.drawn.wrapping_mul(0x9E37_79B9_7F4A_7C15)));
-        unit(word)
     }
 }
 

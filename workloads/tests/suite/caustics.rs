@@ -4,9 +4,11 @@ use std::f64::consts::TAU;
 
 use crate::curved::BallLens;
 use glam::{DVec2, DVec3};
-use pipeline::random::{mix, unit};
+use pipeline::random::SplitMix;
 use workloads::caustics::generator::{Ocean, Wave};
-use workloads::caustics::{Beam, Eye, Floor, Light, Method, Squares, crossing, draw, error, receivers};
+use workloads::caustics::{
+    Beam, BeamMethod, DrawnLight, Eye, Floor, Squares, crossing, draw, error, receivers,
+};
 
 const DEPTH: f64 = 4.0;
 const FLOOR: Floor = Floor { height_m: -DEPTH };
@@ -31,12 +33,14 @@ fn flux_w(beams: &[Beam]) -> f64 {
 
 #[test]
 fn every_method_draws_the_same_image_with_moving_triangles_cheapest() {
-    for (slope, light) in [(0.15, Light::Volume), (0.3, Light::Floor(FLOOR)), (0.6, Light::Volume)] {
+    for (slope, light) in
+        [(0.15, DrawnLight::Volume), (0.3, DrawnLight::Floor(FLOOR)), (0.6, DrawnLight::Volume)]
+    {
         let (beams, eye) = (ocean(10, slope).beams(0.0), aside([84, 56]));
-        let ours = draw(&beams, &eye, Method::Moving, Some(light));
+        let ours = draw(&beams, &eye, BeamMethod::Moving, Some(light));
         assert!(ours.light.iter().filter(|light| **light > 0.0).count() > 500);
         let mut totals = vec![ours.total_runs()];
-        for method in [Method::Refined, Method::Hull, Method::Prism] {
+        for method in [BeamMethod::Refined, BeamMethod::Hull, BeamMethod::Prism] {
             let theirs = draw(&beams, &eye, method, Some(light));
             assert_eq!(theirs.light, ours.light, "{method:?} at {slope}: the same image bit for bit");
             assert!(theirs.runs.iter().zip(&ours.runs).all(|(theirs, ours)| theirs >= ours), "{method:?}");
@@ -58,20 +62,20 @@ fn crossed_sides_make_the_uncut_bound_lose_light() {
     let squares = Squares { eye: &eye, side_px: 8 };
     let known = squares.on_floor(&flat, 0.0, &floor, [600, 1]);
     let difference = |ocean: &Ocean| {
-        let image = draw(&ocean.beams(0.0), &eye, Method::Moving, Some(Light::Floor(floor)));
+        let image = draw(&ocean.beams(0.0), &eye, BeamMethod::Moving, Some(DrawnLight::Floor(floor)));
         error(&squares.of_image(&image.light), &known)
     };
     let beams = pleated.beams(0.0);
     assert!(crossing(&beams) > 0.05 && crossing(&flat.beams(0.0)) < 0.01, "{}", crossing(&beams));
     let (crossed, straight) = (difference(&pleated), difference(&flat));
     assert!((crossed - straight).abs() < 0.03, "{crossed} {straight}");
-    let ours = draw(&beams, &side, Method::Moving, Some(Light::Volume));
-    for method in [Method::Refined, Method::Hull, Method::Prism] {
-        let theirs = draw(&beams, &side, method, Some(Light::Volume));
+    let ours = draw(&beams, &side, BeamMethod::Moving, Some(DrawnLight::Volume));
+    for method in [BeamMethod::Refined, BeamMethod::Hull, BeamMethod::Prism] {
+        let theirs = draw(&beams, &side, method, Some(DrawnLight::Volume));
         assert_eq!(theirs.light, ours.light, "{method:?}");
     }
-    assert_eq!(receivers(&beams, &eye, Method::Moving, &floor).missed, 0);
-    let uncut = draw(&beams, &side, Method::Uncut, Some(Light::Volume));
+    assert_eq!(receivers(&beams, &eye, BeamMethod::Moving, &floor).missed, 0);
+    let uncut = draw(&beams, &side, BeamMethod::Uncut, Some(DrawnLight::Volume));
     assert!(uncut.light.iter().sum::<f64>() < (1.0 - 1e-4) * ours.light.iter().sum::<f64>());
 }
 
@@ -80,7 +84,7 @@ fn drawing_does_not_depend_on_threads() {
     let (beams, eye) = (ocean(10, 0.3).beams(0.2), aside([100, 70]));
     let with = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        pool.install(|| draw(&beams, &eye, Method::Refined, Some(Light::Volume)))
+        pool.install(|| draw(&beams, &eye, BeamMethod::Refined, Some(DrawnLight::Volume)))
     };
     assert_eq!(with(1), with(3));
 }
@@ -89,7 +93,7 @@ fn drawing_does_not_depend_on_threads() {
 fn no_point_of_the_floor_in_a_beam_is_missed() {
     for (cells, slope) in [(12, 0.2), (8, 0.8)] {
         let (beams, eye) = (ocean(cells, slope).beams(0.0), aside([64, 40]));
-        for method in Method::ALL {
+        for method in BeamMethod::ALL {
             let found = receivers(&beams, &eye, method, &FLOOR);
             assert_eq!(found.missed, 0, "{method:?}");
             assert!(found.lit > 300 && found.by_hits.iter().sum::<u64>() == found.lit, "{found:?}");
@@ -105,25 +109,25 @@ fn energy_is_kept() {
         let beams = ocean.beams(0.0);
         let eye = above(16.0, 480);
         let pixel_m2 = (eye.scale_px() * eye.scale_px()).recip();
-        for method in [Method::Moving, Method::Prism] {
-            let floor = draw(&beams, &eye, method, Some(Light::Floor(FLOOR)));
+        for method in [BeamMethod::Moving, BeamMethod::Prism] {
+            let floor = draw(&beams, &eye, method, Some(DrawnLight::Floor(FLOOR)));
             let arrives = floor.light.iter().sum::<f64>() * pixel_m2;
             assert!((arrives / flux_w(&beams) - 1.0).abs() < 0.01, "{slope}: {}", arrives / flux_w(&beams));
         }
         let volume =
-            draw(&beams, &eye, Method::Moving, Some(Light::Volume)).light.iter().sum::<f64>() * pixel_m2;
+            draw(&beams, &eye, BeamMethod::Moving, Some(DrawnLight::Volume)).light.iter().sum::<f64>()
+                * pixel_m2;
         let path = |beam: &Beam| beam.flux_w * (0..3).map(|k| beam.path(k).length()).sum::<f64>() / 3.0;
         let known: f64 = beams.iter().map(path).sum();
         assert!((volume / known - 1.0).abs() < 0.01, "{slope}: {}", volume / known);
     }
 }
 
-struct Photons(u64);
+struct Photons(SplitMix);
 
 impl Photons {
     fn uniform(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        unit(mix(self.0))
+        self.0.next_unit()
     }
 
     /// Start and end of a photon of a random beam, in proportion to flux.
@@ -159,7 +163,7 @@ fn photons_on_the_floor_follow_the_image() {
         .collect();
     let (bins, fine) = (16, 48);
     let eye = above(12.0, bins * fine);
-    let image = draw(&beams, &eye, Method::Moving, Some(Light::Floor(FLOOR)));
+    let image = draw(&beams, &eye, BeamMethod::Moving, Some(DrawnLight::Floor(FLOOR)));
     let photons = 40_000;
     let per_photon = flux_w(&beams) / f64::from(photons);
     let pixel_m2 = (eye.scale_px() * eye.scale_px()).recip();
@@ -169,7 +173,7 @@ fn photons_on_the_floor_follow_the_image() {
         let [x, y] = [place % side, place / side].map(|at| at / fine as usize);
         expected[y * bins as usize + x] += light * pixel_m2 / per_photon;
     }
-    let (mut counts, mut random) = (vec![0.0; expected.len()], Photons(9));
+    let (mut counts, mut random) = (vec![0.0; expected.len()], Photons(SplitMix::new(9)));
     for _ in 0..photons {
         let [from, to] = random.ray(&beams, &until);
         let at = from + (to - from) * ((FLOOR.height_m - from.y) / (to.y - from.y));
@@ -199,10 +203,10 @@ fn photon_paths_follow_the_image_of_the_volume() {
         .collect();
     let (bins, fine) = ([24_u32, 16], 20);
     let eye = aside(bins.map(|bins| bins * fine));
-    let image = draw(&beams, &eye, Method::Moving, Some(Light::Volume));
+    let image = draw(&beams, &eye, BeamMethod::Moving, Some(DrawnLight::Volume));
     // Random positions on rays, each of which represents a part of the path.
     let places = 200_000;
-    let mut random = Photons(4);
+    let mut random = Photons(SplitMix::new(4));
     let (mut counts, mut expected) = (vec![0.0; 24 * 16], vec![0.0; 24 * 16]);
     let mut path = 0.0;
     for _ in 0..places {
@@ -238,8 +242,8 @@ fn one_wave_agrees_with_the_closed_form() {
         let mut water = Ocean { overshoot: 0.01, ..Ocean::new(300, 3.0, depth_m, [1.0, 0.1], 1) };
         (water.waves, water.sun) = (vec![wave], DVec3::NEG_Y);
         let eye = above(1.0, 200);
-        let floor = Light::Floor(Floor { height_m: -depth_m });
-        let image = draw(&water.beams(0.0), &eye, Method::Moving, Some(floor));
+        let floor = DrawnLight::Floor(Floor { height_m: -depth_m });
+        let image = draw(&water.beams(0.0), &eye, BeamMethod::Moving, Some(floor));
         let enters = 1.0 - (0.33_f64 / 2.33).powi(2);
         let (mut difference, mut sum) = (0.0, 0.0);
         for column in 0..200 {
@@ -286,7 +290,7 @@ fn a_ball_lens_agrees_with_the_closed_form() {
         .map(|beam| Beam { open: beam.open.map(turn), close: beam.close.map(turn), ..beam })
         .collect();
     let eye = above(2.0, 240);
-    let image = draw(&beams, &eye, Method::Moving, Some(Light::Floor(Floor { height_m: -reach_m })));
+    let image = draw(&beams, &eye, BeamMethod::Moving, Some(DrawnLight::Floor(Floor { height_m: -reach_m })));
     let lands = |h: f64| {
         let (i, r) = (h.asin(), (h / 1.5).asin());
         let turned = 2.0 * (i - r);

@@ -6,7 +6,7 @@ use pipeline::{Camera, ComputeSpec, Format, Gpu, Lane, PipelineSpec, SurfaceId, 
 use workloads::compute::{
     Atomics, Compute, ComputeOptions, Kernel, Kernels, LightSphere, Order, TileLights, bin,
 };
-use workloads::job::{DrawsScene, Job, OptionSource, Request};
+use workloads::job::{DrawsScene, Job, JobRequest, OptionSource};
 use workloads::scene::{Frame, Overrides};
 
 use crate::common::{drawn_on, spec};
@@ -441,7 +441,7 @@ fn options_are_checked() {
         ("kernel", "blur", "unknown value `blur`"),
     ] {
         let source = OptionSource { file: None, set: vec![(name.to_owned(), value.to_owned())] };
-        let request = Request { overrides: &Overrides::default(), seed: 1 };
+        let request = JobRequest { overrides: &Overrides::default(), seed: 1 };
         let error = workloads::compute::job(&source, &request).err().unwrap().to_string();
         assert!(error.contains(name) && error.contains(says), "{error}");
     }

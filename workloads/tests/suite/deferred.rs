@@ -3,7 +3,7 @@
 use activity::Event;
 use glam::{DVec3, Vec3};
 use pipeline::{FrameReport, Gpu};
-use workloads::deferred::{Deferred, DeferredOptions, LightPass, Method, NormalFormat, Rate};
+use workloads::deferred::{Deferred, DeferredOptions, LightPass, LightingMethod, LightingRate, NormalFormat};
 use workloads::job::{Drawn, Job};
 use workloads::scene::{Local, Node, Parts, Rig, Scene, SceneCamera, Settings, Trs};
 use workloads::{Alpha, Material, Overrides, shapes};
@@ -29,7 +29,7 @@ fn with(options: DeferredOptions, samples: u32) -> (Drawn, FrameReport) {
 }
 
 fn forward(options: &DeferredOptions, samples: u32) -> Vec<Vec3> {
-    with(DeferredOptions { method: Method::Forward, ..options.clone() }, samples).0.image
+    with(DeferredOptions { method: LightingMethod::Forward, ..options.clone() }, samples).0.image
 }
 
 fn largest(a: &[Vec3], b: &[Vec3]) -> f32 {
@@ -130,7 +130,8 @@ fn counts_are_those_of_the_code_that_ran() {
     assert_eq!(eight - four, 2 * (four - two), "each light runs the same code for each surface");
     // Forward rendering runs it for every fragment that is shaded, hidden ones, too.
     let of_forward = |lights| {
-        let options = DeferredOptions { method: Method::Forward, lights, ..DeferredOptions::default() };
+        let options =
+            DeferredOptions { method: LightingMethod::Forward, lights, ..DeferredOptions::default() };
         let (_, report) = with(options, 1);
         assert_eq!(report.passes.len(), 2);
         report.passes[0].counts()[Event::ShaderOps]
@@ -158,7 +159,7 @@ fn one_lit_sample_does_not_stand_for_a_pixel() {
     let options = DeferredOptions { lights: 4, ..DeferredOptions::default() };
     let wanted = forward(&options, 4);
     let (each, _) = with(options.clone(), 4);
-    let (one, _) = with(DeferredOptions { rate: Rate::Pixel, ..options }, 4);
+    let (one, _) = with(DeferredOptions { rate: LightingRate::Pixel, ..options }, 4);
     let codes = |drawn: &Drawn| drawn.warnings.iter().map(|warning| warning.code.name()).collect::<Vec<_>>();
     assert_eq!((codes(&each), codes(&one)), (vec![], vec!["deferred-one-surface"]));
     let errors = [&each, &one].map(|drawn| rms(&drawn.image, &wanted));
@@ -199,7 +200,7 @@ fn blended_surfaces_are_lit_forward_over_the_lit_buffer() {
     let names: Vec<&str> = report.passes.iter().map(|pass| pass.name.as_str()).collect();
     assert_eq!(names, ["g-buffer", "lighting", "blended", "resolve"]);
     let (wanted, _) =
-        of(pane(DVec3::ZERO), DeferredOptions { method: Method::Forward, ..options }, &overrides(1));
+        of(pane(DVec3::ZERO), DeferredOptions { method: LightingMethod::Forward, ..options }, &overrides(1));
     let (error, most) = (largest(&deferred.image, &wanted.image), bound(SCENE + 2.0 * LIGHT, HALF));
     assert!(error < most, "{error} of {most}");
     let middle = wanted.image[(27 * 96 + 48) as usize];
@@ -212,8 +213,9 @@ fn moving_objects_have_a_surface_for_every_sample() {
     let overrides = Overrides { shutter: Some(1.0), table: Some("owen".to_owned()), ..overrides(16) };
     let fast = DVec3::new(20.0, 0.0, 0.0);
     let image = |options: DeferredOptions| of(pane(fast), options, &overrides).0;
-    let wanted = image(DeferredOptions { method: Method::Forward, ..options.clone() });
-    let (each, one) = (image(options.clone()), image(DeferredOptions { rate: Rate::Pixel, ..options }));
+    let wanted = image(DeferredOptions { method: LightingMethod::Forward, ..options.clone() });
+    let (each, one) =
+        (image(options.clone()), image(DeferredOptions { rate: LightingRate::Pixel, ..options }));
     assert!(each.moving && each.warnings.is_empty(), "{:?}", each.warnings);
     let errors = [&each, &one].map(|drawn| rms(&drawn.image, &wanted.image));
     assert!(errors[1] > 3.0 * errors[0], "{errors:?}");
@@ -231,9 +233,9 @@ fn a_camera_that_moves_while_the_shutter_is_open_is_reported() {
         );
         drawn.warnings.iter().map(|warning| warning.code.name()).collect::<Vec<_>>()
     };
-    assert_eq!(codes(&moving, Method::Deferred), ["deferred-moving-camera"]);
-    assert!(codes(&moving, Method::Forward).is_empty());
-    assert!(codes(&Overrides { shutter: None, ..moving }, Method::Deferred).is_empty());
+    assert_eq!(codes(&moving, LightingMethod::Deferred), ["deferred-moving-camera"]);
+    assert!(codes(&moving, LightingMethod::Forward).is_empty());
+    assert!(codes(&Overrides { shutter: None, ..moving }, LightingMethod::Deferred).is_empty());
 }
 
 #[test]

@@ -161,9 +161,10 @@ fn files_that_are_something_else_are_refused() {
         expect(&text, &[name]);
     }
     let text = broken(|file| {
-        let asked = json!(["KHR_draco_mesh_compression", "KHR_materials_unlit", "EXT_mesh_gpu_instancing"]);
-        file.json["extensionsRequired"] = asked.clone();
-        file.json["extensionsUsed"] = asked;
+        let extensions =
+            json!(["KHR_draco_mesh_compression", "KHR_materials_unlit", "EXT_mesh_gpu_instancing"]);
+        file.json["extensionsRequired"] = extensions.clone();
+        file.json["extensionsUsed"] = extensions;
     });
     let named = "extensionsRequired: `KHR_draco_mesh_compression`, `EXT_mesh_gpu_instancing` not supported";
     expect(&text, &[named, "export it without"]);

@@ -4,7 +4,7 @@ use crate::common::{drawn_on, expect, spec};
 use activity::Counts;
 use glam::Vec3;
 use workloads::catalog::find;
-use workloads::job::{OptionSource, Request};
+use workloads::job::{JobRequest, OptionSource};
 use workloads::{LoadError, Overrides};
 
 type Change = fn(&mut Overrides);
@@ -38,7 +38,7 @@ fn options(job: &str) -> OptionSource {
 
 /// Frame 1, in which moving objects have moved.
 fn drawn(job: &str, overrides: &Overrides) -> Result<(Vec<Vec3>, Counts), LoadError> {
-    let job = find(job, &options(job), &Request { overrides, seed: 1 }).unwrap()?;
+    let job = find(job, &options(job), &JobRequest { overrides, seed: 1 }).unwrap()?;
     let (drawn, report) = drawn_on(&spec(), &*job, 1);
     Ok((drawn.image, report.counts()))
 }
@@ -109,7 +109,7 @@ fn views_of_a_scene_without_a_lens_are_focused() {
     options.set.push(("scene".to_owned(), scene));
     let made = |focus| {
         let overrides = Overrides { focus, ..usual("multiview", "--focus") };
-        find("multiview", &options, &Request { overrides: &overrides, seed: 1 }).unwrap()
+        find("multiview", &options, &JobRequest { overrides: &overrides, seed: 1 }).unwrap()
     };
     assert!(made(Some(2.5)).is_ok());
     expect(&made(None).err().unwrap().to_string(), &["focus", "no lens"]);
@@ -118,7 +118,7 @@ fn views_of_a_scene_without_a_lens_are_focused() {
 #[test]
 fn what_draws_no_samples_of_a_table_names_none() {
     let table = |job: &str| {
-        let request = Request { overrides: &Overrides::default(), seed: 1 };
+        let request = JobRequest { overrides: &Overrides::default(), seed: 1 };
         find(job, &options(job), &request).unwrap().unwrap().settings().table.clone()
     };
     assert_eq!(["caustics", "ccd", "occlusion"].map(table), ["none", "none", "owen"]);

@@ -10,7 +10,7 @@ use glam::{Vec2, Vec3, Vec4};
 use pipeline::{Gpu, Lane, Lens, PipelineSpec, ShadingPoint, Viewport};
 use serde_json::json;
 use workloads::catalog::find;
-use workloads::job::{Job, OptionSource, Request};
+use workloads::job::{Job, JobRequest, OptionSource};
 use workloads::{Fingerprint, Frame, Overrides, Scene, load};
 
 const OBJECTS: &str =
@@ -175,7 +175,7 @@ fn what_leaves_a_fitted_view_is_reported() {
 fn job(name: &str, set: &[(&str, &str)]) -> Box<dyn Job> {
     let set = set.iter().map(|(name, value)| ((*name).to_owned(), (*value).to_owned())).collect();
     let overrides = Overrides::default();
-    find(name, &OptionSource { file: None, set }, &Request { overrides: &overrides, seed: 1 })
+    find(name, &OptionSource { file: None, set }, &JobRequest { overrides: &overrides, seed: 1 })
         .unwrap()
         .unwrap()
 }
@@ -206,7 +206,7 @@ fn workloads_without_a_scene_say_what_changes() {
 fn a_stopped_search_ends() {
     let set = [("resolution", "32"), ("balls", "8")];
     let set = set.iter().map(|(key, value)| ((*key).to_owned(), (*value).to_owned())).collect();
-    let request = Request { overrides: &Overrides::default(), seed: 1 };
+    let request = JobRequest { overrides: &Overrides::default(), seed: 1 };
     let job = find("ccd", &OptionSource { file: None, set }, &request).unwrap().unwrap();
     let packets = |most: u32| {
         let (spec, stop, mut packets) = (crate::common::spec(), Cell::new(false), 0);
@@ -228,7 +228,7 @@ fn views_side_by_side_are_on_heat_maps() {
     for is_each in ["false", "true"] {
         let set = vec![("view_by_view".to_owned(), is_each.to_owned())];
         let overrides = Overrides { size: Some((26, 20)), ..Overrides::default() };
-        let request = Request { overrides: &overrides, seed: 1 };
+        let request = JobRequest { overrides: &overrides, seed: 1 };
         let job = find("multiview", &OptionSource { file: None, set }, &request).unwrap().unwrap();
         let viewport = Viewport::new(52, 20).unwrap();
         let spec = crate::common::spec();
@@ -259,7 +259,7 @@ fn passes_in_conservative_mode_are_on_heat_maps() {
     ] {
         let set = set.iter().map(|(key, value)| ((*key).to_owned(), (*value).to_owned())).collect();
         let overrides = Overrides { size, ..Overrides::default() };
-        let request = Request { overrides: &overrides, seed: 1 };
+        let request = JobRequest { overrides: &overrides, seed: 1 };
         let job = find(name, &OptionSource { file: None, set }, &request).unwrap().unwrap();
         let settings = job.settings();
         let viewport = Viewport::new(settings.width, settings.height).unwrap();

@@ -4,8 +4,8 @@ use glam::{DVec3, Vec3};
 use pipeline::sampling::SampleSource;
 use pipeline::{Cull, Draw, Geometry, Gpu, LensShape, SampleSpec, SampleTable};
 use workloads::Overrides;
-use workloads::accumulation::{RayWork, Rays, SharedSamples};
-use workloads::glossy::{Effect, Glossy, GlossyOptions, Lobe, Map, Receiver, default_scene, receiver};
+use workloads::accumulation::{RayCaster, RayWork, SharedSamples};
+use workloads::glossy::{Glossy, GlossyEffect, GlossyOptions, Lobe, Map, Receiver, default_scene, receiver};
 use workloads::job::Job;
 
 use crate::common::{White, drawn_on, rmse, spec};
@@ -18,9 +18,9 @@ fn table(samples: u32, shape: LensShape) -> SampleTable {
 
 /// The map of a white half plane at a height, with its edge across the receiver, and the brightness of each
 /// column.
-fn edge(height: f64, radius: f64, effect: Effect) -> (Map, Vec<f64>) {
+fn edge(height: f64, radius: f64, effect: GlossyEffect) -> (Map, Vec<f64>) {
     let map = Map::new(&Receiver::lying(DVec3::ZERO, [1.0, 0.5]), EYE, effect, radius, 64).unwrap();
-    let side = if effect == Effect::Reflection { 1.0 } else { -1.0 };
+    let side = if effect == GlossyEffect::Reflection { 1.0 } else { -1.0 };
     let y = (side * height) as f32;
     let corners = [[0.0, -99.0], [99.0, -99.0], [99.0, 99.0], [0.0, 99.0]].map(|[x, z]| Vec3::new(x, y, z));
     let triangles = [[0, 1, 2], [0, 2, 3]];
@@ -52,7 +52,7 @@ fn ramp(columns: &[f64]) -> f64 {
 /// Contact hardening: the blur on the plane is 2 R h / (d + h) wide, through a square lens a linear ramp.
 #[test]
 fn the_blur_widens_with_height_as_in_the_closed_form() {
-    for effect in [Effect::Reflection, Effect::Refraction(1.4)] {
+    for effect in [GlossyEffect::Reflection, GlossyEffect::Refraction(1.4)] {
         let mut last = 0.0;
         for height in [0.05, 0.3, 1.0, 2.0] {
             let (map, columns) = edge(height, 0.2, effect);
@@ -65,7 +65,7 @@ fn the_blur_widens_with_height_as_in_the_closed_form() {
             last = found;
         }
     }
-    let (_, mirror) = edge(1.0, 0.0, Effect::Reflection);
+    let (_, mirror) = edge(1.0, 0.0, GlossyEffect::Reflection);
     assert!(
         mirror.iter().filter(|c| (0.01..0.99).contains(*c)).count() <= 2,
         "without a lens the edge is sharp"
@@ -75,7 +75,7 @@ fn the_blur_widens_with_height_as_in_the_closed_form() {
 /// Compares every texel with rays from the mirrored viewer.
 #[test]
 fn one_pass_accumulation_and_rays_agree() {
-    for (effect, below) in [(Effect::Reflection, false), (Effect::Refraction(1.33), true)] {
+    for (effect, below) in [(GlossyEffect::Reflection, false), (GlossyEffect::Refraction(1.33), true)] {
         let scene = default_scene(below).unwrap();
         let frame = scene.frame(0).unwrap();
         let draws: Vec<_> = frame.draws(&scene).unwrap().into_iter().map(|d| d.culling(Cull::None)).collect();
@@ -84,7 +84,7 @@ fn one_pass_accumulation_and_rays_agree() {
         let map = Map::new(&receiver(), eye, effect, 0.3, 24).unwrap();
         let colours: Vec<_> =
             frame.meshes.iter().map(|mesh| scene.materials()[mesh.material].base_color).collect();
-        let rays = Rays::new(&draws);
+        let rays = RayCaster::new(&draws);
         let samples = table(64, LensShape::Disk);
         let sky = scene.background();
         let (traced, work) =
@@ -117,7 +117,7 @@ fn more_samples_reduce_the_error() {
     let draws = frame.draws(&scene).unwrap();
     let world = frame.camera.open().inverse();
     let eye = (world.translation.as_dvec3(), world.matrix3.z_axis.as_dvec3());
-    let map = Map::new(&receiver(), eye, Effect::Reflection, 0.3, 16).unwrap();
+    let map = Map::new(&receiver(), eye, GlossyEffect::Reflection, 0.3, 16).unwrap();
     let image = |seed, samples| {
         let table = SampleTable::new(&SampleSpec::default(), samples, seed).unwrap();
         map.one_pass(&draws, &table, scene.background(), &mut Gpu::without_packets(&spec()).unwrap())
@@ -164,7 +164,7 @@ fn a_mirror_shows_what_is_mirrored() {
     let scene = default_scene(false).unwrap().with_overrides(&overrides).unwrap();
     let frame = scene.frame(0).unwrap();
     let draws = frame.draws(&scene).unwrap();
-    let (rays, camera) = (Rays::new(&draws), frame.camera);
+    let (rays, camera) = (RayCaster::new(&draws), frame.camera);
     let world = camera.open().inverse();
     let (mut right, mut all, work) = (0, 0, &mut RayWork::default());
     for (x, y) in (0..WIDE).flat_map(|x| (0..216).map(move |y| (x, y))) {

@@ -2,7 +2,7 @@
 
 use crate::common::{Files, expect, failure};
 use workloads::catalog::find;
-use workloads::job::{OptionSource, Request};
+use workloads::job::{JobRequest, OptionSource};
 use workloads::{LoadError, Overrides, load};
 
 #[test]
@@ -137,7 +137,7 @@ fn a_pipe_and_a_truncated_file_have_different_messages() {
 
 /// The error of a workload with these options.
 fn refusal(job: &str, options: &OptionSource) -> Option<LoadError> {
-    find(job, options, &Request { overrides: &Overrides::default(), seed: 1 }).unwrap().err()
+    find(job, options, &JobRequest { overrides: &Overrides::default(), seed: 1 }).unwrap().err()
 }
 
 #[test]

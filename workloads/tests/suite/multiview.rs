@@ -4,7 +4,7 @@ use activity::Event;
 use glam::{Affine3A, Vec3};
 use pipeline::{CacheSpec, Camera, Cull, Draw, Geometry, Gpu, PipelineSpec, Shading, Viewport};
 use workloads::job::Job;
-use workloads::multiview::{Layout, MultiView, MultiViewOptions, Rig, Show, Target, Views};
+use workloads::multiview::{Layout, MultiView, MultiViewOptions, MultiviewRig, Show, ViewTarget, Views};
 use workloads::{Overrides, Scene};
 
 use crate::common::{White, bits, drawn_on, rmse, spec};
@@ -25,13 +25,13 @@ fn with<R>(
     scene: &Scene,
     (layout, samples): (Layout, u32),
     spec: &PipelineSpec,
-    run: impl FnOnce(&Rig, &[Draw<'_>], &Target<'_>) -> R,
+    run: impl FnOnce(&MultiviewRig, &[Draw<'_>], &ViewTarget<'_>) -> R,
 ) -> R {
     let frame = scene.frame(1).unwrap();
     let draws = frame.draws(scene).unwrap();
-    let rig = Rig::new(&frame.camera, 4.0, &layout, samples, 3).unwrap();
+    let rig = MultiviewRig::new(&frame.camera, 4.0, &layout, samples, 3).unwrap();
     let viewport = Viewport::new(64, 48).unwrap();
-    run(&rig, &draws, &Target { viewport, spec, background: scene.background(), places: &[] })
+    run(&rig, &draws, &ViewTarget { viewport, spec, background: scene.background(), places: &[] })
 }
 
 fn one_pass(scene: &Scene, layout: (Layout, u32), spec: &PipelineSpec) -> Views {
@@ -109,9 +109,9 @@ fn accumulation_blurs_moving_objects_and_moving_cameras() {
             let (open, close, spec) = (strip(-0.9), strip(-0.9 + by), spec());
             let geometry = Geometry::new(&open, &close, &[[0, 1, 2], [0, 2, 3]]).unwrap();
             let draws = [Draw::new(geometry, &White, Cull::None)];
-            let rig = Rig::new(camera, 4.0, &Layout::stereo(0.28, 0.11), 64, 3).unwrap();
-            let to = Target { viewport, spec: &spec, background: Vec3::ZERO, places: &[] };
-            let views = if many { Rig::accumulated } else { Rig::one_pass };
+            let rig = MultiviewRig::new(camera, 4.0, &Layout::stereo(0.28, 0.11), 64, 3).unwrap();
+            let to = ViewTarget { viewport, spec: &spec, background: Vec3::ZERO, places: &[] };
+            let views = if many { MultiviewRig::accumulated } else { MultiviewRig::one_pass };
             views(&rig, &draws, &to, &mut Gpu::without_packets(to.spec).unwrap()).unwrap().images
         };
         let (one, many, frozen) =

@@ -11,7 +11,7 @@ use pipeline::{
 use proptest::prelude::*;
 use workloads::Overrides;
 use workloads::catalog::find;
-use workloads::job::{Job, OptionSource, Request};
+use workloads::job::{Job, JobRequest, OptionSource};
 use workloads::occlusion::{WallScene, WallSceneSpec, depths_of};
 use workloads::visibility::Unshaded;
 
@@ -35,8 +35,8 @@ fn query(wall_scene: &WallScene, size: [u32; 2], per_pixel: u32, grids: &[([u32;
     let depths = depths_of(&pass.uncounted().unwrap().visible);
     let sampled =
         SampledQueries { occluders: RasterPass::new(&wall_scene.camera, &walls, &settings), any: false };
-    let all = sampled.ask(&wall_scene.boxes).unwrap().answers;
-    let any = SampledQueries { any: true, ..sampled }.ask(&wall_scene.boxes).unwrap().answers;
+    let all = sampled.query(&wall_scene.boxes).unwrap().answers;
+    let any = SampledQueries { any: true, ..sampled }.query(&wall_scene.boxes).unwrap().answers;
     for (all, any) in all.iter().zip(&any) {
         assert_eq!(all.passed == 0, any.passed == 0, "both kinds agree");
         assert!(any.tests() <= all.tests() && any.madds <= all.madds);
@@ -50,7 +50,7 @@ fn query(wall_scene: &WallScene, size: [u32; 2], per_pixel: u32, grids: &[([u32;
         let pyramid = Pyramid::new(viewport, &samples, &depths, tile_px, grid);
         half_covered = pyramid.half_covered();
         let queries = IntervalQueries::new(&pyramid, &projection);
-        wall_scene.boxes.iter().map(|object| queries.ask(object).hidden).collect()
+        wall_scene.boxes.iter().map(|object| queries.query(object).hidden).collect()
     });
     let by_intervals: Vec<Vec<bool>> = by_intervals.collect();
     for hidden in &by_intervals {
@@ -153,7 +153,7 @@ fn job(query: &str) -> Box<dyn Job> {
         set: vec![("query".into(), query.into()), ("objects".into(), "40".into())],
     };
     let overrides = Overrides { size: Some((128, 72)), samples: Some(8), ..Overrides::default() };
-    find("occlusion", &options, &Request { overrides: &overrides, seed: 1 }).unwrap().unwrap()
+    find("occlusion", &options, &JobRequest { overrides: &overrides, seed: 1 }).unwrap().unwrap()
 }
 
 /// Image and facts, and the work of the GPU.

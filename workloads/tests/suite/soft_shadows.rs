@@ -3,6 +3,7 @@
 use activity::{Event, Unit};
 use glam::{DVec3, Vec3};
 use pipeline::geometry::Projection;
+use pipeline::random::{GOLDEN, mix};
 use pipeline::sampling::{Pattern, Sample, SampleSpec};
 use pipeline::{Clip, Cull, Draw, Geometry, Gpu, Lane, Viewport};
 use proptest::prelude::*;
@@ -10,8 +11,8 @@ use workloads::Overrides;
 use workloads::accumulation::SharedSamples;
 use workloads::job::{Drawn, Job};
 use workloads::soft_shadows::{
-    AreaLight, DepthPass, LightSpec, Method, SceneView, ShadowMap, Shadows, SoftShadowOptions, SoftShadows,
-    VisibleTriangles, World, depth_pass, look_ups,
+    AreaLight, DepthPass, LightSpec, SceneView, ShadowMap, ShadowMethod, Shadows, SoftShadowOptions,
+    SoftShadows, VisibleTriangles, World, depth_pass, look_ups,
 };
 use workloads::visibility::Unshaded;
 
@@ -68,7 +69,7 @@ fn is_lit(map: &ShadowMap, light: &AreaLight, at: (Vec3, usize), bias: f64) -> b
 #[test]
 fn look_ups_cost_what_they_compute() {
     let (floor, light) = (quad(0.0, [-9.0, 9.0], [-9.0, 9.0]), above(0.6));
-    let map = map(&light, &[draw(&floor, &floor, &TRIANGLES)], 64, &set(4, 3), Method::OnePass);
+    let map = map(&light, &[draw(&floor, &floor, &TRIANGLES)], 64, &set(4, 3), ShadowMethod::OnePass);
     let look_up = |point: Vec3| {
         let (lane, mut fetches) = (Lane::default(), 0);
         assert!(map.is_lit(&lane, &light, (point, 0), 0.02, |_| fetches += 1));
@@ -90,7 +91,7 @@ fn lanes_project_the_vertices_of_their_triangle() {
         let draws = [draw(&floor, close, &TRIANGLES)];
         let view = SceneView { camera: &camera, draws: &draws };
         let mut gpu = Gpu::without_packets(&spec).unwrap();
-        let seen = VisibleTriangles::draw(&view, viewport, &set, Method::OnePass, &mut gpu).unwrap();
+        let seen = VisibleTriangles::draw(&view, viewport, &set, ShadowMethod::OnePass, &mut gpu).unwrap();
         let world = World::new(&view, viewport, &light, &[Vec3::ONE], Vec3::ZERO);
         look_ups(&world, &set, &seen, Shadows::None, &mut gpu).counts[Event::ShaderOps]
     };
@@ -104,7 +105,13 @@ fn above(radius: f64) -> AreaLight {
     AreaLight::new(&spec).unwrap()
 }
 
-fn map(light: &AreaLight, draws: &[Draw<'_>], side: u32, set: &SharedSamples, method: Method) -> ShadowMap {
+fn map(
+    light: &AreaLight,
+    draws: &[Draw<'_>],
+    side: u32,
+    set: &SharedSamples,
+    method: ShadowMethod,
+) -> ShadowMap {
     ShadowMap::new(light, draws, side, set, method, &mut Gpu::without_packets(&spec()).unwrap()).unwrap()
 }
 
@@ -137,7 +144,7 @@ proptest! {
     ) {
         let mut state = seed;
         let mut number = || {
-            state = pipeline::random::mix(state.wrapping_add(0x9E37_79B9_7F4A_7C15));
+            state = mix(state.wrapping_add(GOLDEN));
             (state >> 40) as f32 / 8_388_608.0 - 1.0
         };
         let mut points = |spread: f32| -> Vec<Vec3> {
@@ -155,7 +162,7 @@ proptest! {
         let light = LightSpec { position: [1.0, 4.0, -2.0], target: [0.3, 0.1, 0.0], radius, fov_deg: 80.0, near: 0.1 };
         let light = AreaLight::new(&light).unwrap();
         let set = set(count, seed);
-        let [one, many] = [Method::OnePass, Method::Accumulation]
+        let [one, many] = [ShadowMethod::OnePass, ShadowMethod::Accumulation]
             .map(|method| map(&light, &draws, 32, &set, method));
         let of = |map: &ShadowMap| map.depths().iter().map(|d| d.to_bits()).collect::<Vec<_>>();
         prop_assert_eq!(of(&one), of(&many));
@@ -172,7 +179,7 @@ fn the_penumbra_follows_the_closed_form() {
     let light = above(0.6);
     let square = SampleSpec { lens: pipeline::LensShape::Square, ..SampleSpec::default() };
     let set = SharedSamples::interleaved(&square, 256, 3).unwrap();
-    let map = map(&light, &draws, 512, &set, Method::OnePass);
+    let map = map(&light, &draws, 512, &set, ShadowMethod::OnePass);
     let lit = |x: f32| {
         let point = Vec3::new(x, 0.0, 0.3);
         (0..256).filter(|&index| is_lit(&map, &light, (point, index), 0.02)).count() as f64 / 256.0
@@ -194,7 +201,7 @@ fn motion_blurs_the_shadow_by_the_share_of_time() {
     let draws = [draw(&floor, &floor, &TRIANGLES), draw(&open, &close, &TRIANGLES)];
     let light = above(1e-4);
     let set = set(256, 9);
-    let map = map(&light, &draws, 256, &set, Method::OnePass);
+    let map = map(&light, &draws, 256, &set, ShadowMethod::OnePass);
     let lit = (0..256).filter(|&index| is_lit(&map, &light, (Vec3::ZERO, index), 0.05)).count();
     // The strip is 1 wide and moves by 4: it covers the point for a quarter of the time.
     assert!((lit as f64 / 256.0 - 0.75).abs() < 0.01, "{lit}");
@@ -202,7 +209,8 @@ fn motion_blurs_the_shadow_by_the_share_of_time() {
 
 /// The visible samples of a view, in one pass.
 fn visible(view: &SceneView<'_>, viewport: Viewport, set: &SharedSamples) -> DepthPass {
-    depth_pass(view, viewport, set, Method::OnePass, &mut Gpu::without_packets(&spec()).unwrap()).unwrap()
+    depth_pass(view, viewport, set, ShadowMethod::OnePass, &mut Gpu::without_packets(&spec()).unwrap())
+        .unwrap()
 }
 
 /// Lambert's law: a floor has the cosine of its angle to the light at the time of the sample, plus ambient
@@ -256,7 +264,7 @@ fn rays_agree_with_a_map(clip: Clip, least: [usize; 2]) {
     let view = SceneView { camera: &camera, draws: &draws };
     let seen = visible(&view, viewport, &set);
     let world = World::new(&view, viewport, &light, &[], Vec3::ZERO);
-    let map = map(&light, &draws, 512, &set, Method::OnePass);
+    let map = map(&light, &draws, 512, &set, ShadowMethod::OnePass);
     let of = |shadows| world.lit_and_unlit(&set, &seen.samples, shadows);
     let (by_map, by_rays) = (of(Shadows::Map { map: &map, bias: 0.02 }), of(Shadows::Rays));
     let facing = by_rays.iter().flatten().count();
@@ -280,7 +288,7 @@ fn depth_passes_write_depths_only() {
     let draws = [draw(&floor, &floor, &TRIANGLES)];
     let spec = spec();
     let mut gpu = Gpu::without_packets(&spec).unwrap();
-    let map = ShadowMap::new(&light, &draws, 64, &set, Method::OnePass, &mut gpu).unwrap();
+    let map = ShadowMap::new(&light, &draws, 64, &set, ShadowMethod::OnePass, &mut gpu).unwrap();
     let counts = gpu.finish().counts();
     assert!(!counts.uses(Unit::Colour) && !counts.uses(Unit::ShadingCache));
     assert_eq!(counts[Event::DramWriteBytes], map.bytes(), "each depth goes to memory once");
@@ -298,7 +306,7 @@ fn shading_fetches_what_it_reads() {
     let (camera, set, spec) = (frame.camera.with_lens(None), set(8, 5), spec());
     let albedos: Vec<Vec3> = (0..draws.len()).map(|draw| Vec3::splat(0.1 + 0.1 * draw as f32)).collect();
     let samples = (viewport.pixels() * set.samples().len()) as u64;
-    for method in [Method::OnePass, Method::Accumulation] {
+    for method in [ShadowMethod::OnePass, ShadowMethod::Accumulation] {
         let mut gpu = Gpu::without_packets(&spec).unwrap();
         let draws = gpu.resident(&draws);
         let view = SceneView { camera: &camera, draws: &draws };

@@ -8,7 +8,7 @@ use glam::Vec3;
 use proptest::prelude::*;
 use workloads::LoadError;
 use workloads::collision::{CaseFiles, load_cases};
-use workloads::collision::{Object, Search, detect};
+use workloads::collision::{Object, PairSearch, detect};
 use workloads::visibility::{CameraSpec, VisibilityScene, load, parse_m5d, parse_mts};
 
 const SQUARE: [[f32; 3]; 4] = [[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [1.0, 1.0, 0.0], [-1.0, 1.0, 0.0]];
@@ -188,7 +188,7 @@ fn a_contact_below_the_smallest_normal_f32_is_not_missed() {
     let mesh = files.put("a.obj", format!("{point}{segment}f 1 2 3\nf 4 5 6\n"));
     let case = CaseFiles::of(&[&mesh, &mesh]).unwrap()[0].load().unwrap();
     let objects = case.objects.iter().map(|mesh| Object::new(mesh, case.uncertainty).unwrap());
-    let found = detect(&objects.collect::<Vec<_>>(), &Search::default());
+    let found = detect(&objects.collect::<Vec<_>>(), &PairSearch::default());
     assert!(found.iter().any(|answer| answer.verdict.may_collide()), "{found:?}");
 }
 

@@ -8,8 +8,8 @@ pub mod stage;
 use glam::{Affine3A, Vec3, Vec4};
 use pipeline::conservative::{Grid, MovingTriangle, Rasterizer, Rect, Region, Touch};
 use pipeline::depth::DepthSpec;
-use pipeline::random::mix;
-use pipeline::sample_test::{Hits, Target, test_run};
+use pipeline::random::{GOLDEN, SplitMix, mix};
+use pipeline::sample_test::{Hits, StoredSamples, test_run};
 use pipeline::sampling::{Sample, TileSamples};
 use pipeline::setup::{SetupResult, Triangle, set_up};
 use pipeline::traversal::Box5;
@@ -17,17 +17,16 @@ use pipeline::*;
 pub use probe::{Probe, SamplePosition, repeated, sample_positions, weight};
 use proptest::prelude::*;
 
-/// Counter-based uniform numbers in [0, 1).
-pub struct Uniform(u64, u64);
+/// Uniform numbers in [0, 1).
+pub struct Uniform(SplitMix);
 
 impl Uniform {
     pub fn new(seed: u64) -> Self {
-        Self(mix(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) + 1), 0)
+        Self(SplitMix::new(mix(seed.wrapping_mul(GOLDEN) + 1)))
     }
 
     pub fn next(&mut self) -> f32 {
-        self.1 += 1;
-        (mix(self.0.wrapping_add(self.1.wrapping_mul(0x9E37_79B9_7F4A_7C15))) >> 40) as f32 / 16_777_216.0
+        (self.0.next_word() >> 40) as f32 / 16_777_216.0
     }
 
     pub fn within(&mut self, lo: f32, hi: f32) -> f32 {
@@ -242,7 +241,7 @@ impl TileOfSoup<'_> {
     pub fn test(&self, id: usize, cull: Cull, depth: &mut [f32], triangle: &mut [u32]) -> Vec<u16> {
         let mut hits = Hits::default();
         if let Some(ready) = (self.set_up)(id, cull) {
-            let mut target = Target { depth, triangle };
+            let mut target = StoredSamples { depth, triangle };
             test_run(&ready, self.samples, &Box5::whole(true), 0.25, &mut target, &mut hits);
         }
         hits.written

@@ -1,6 +1,6 @@
 //! Samples of one tile, tested against single triangles.
 
-use pipeline::sample_test::{Hits, Target, test_run};
+use pipeline::sample_test::{Hits, StoredSamples, test_run};
 use pipeline::sampling::{Sample, TileSamples};
 use pipeline::setup::{Corner, SetupResult, Triangle, set_up};
 use pipeline::traversal::Box5;
@@ -51,7 +51,7 @@ impl Probe {
         let mut depth = vec![f32::INFINITY; self.samples.len];
         let mut owner = vec![u32::MAX; self.samples.len];
         let mut hits = Hits::default();
-        let mut target = Target { depth: &mut depth, triangle: &mut owner };
+        let mut target = StoredSamples { depth: &mut depth, triangle: &mut owner };
         test_run(triangle, &self.samples, within, self.near, &mut target, &mut hits);
         let seen = depth.into_iter().zip(owner).map(|(d, id)| (id == triangle.id).then_some(d)).collect();
         (seen, hits)

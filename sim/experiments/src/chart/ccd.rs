@@ -7,9 +7,9 @@ use output::plot::{ChartPanel, Scale, Series};
 use output::terminal::Progress;
 use serde::Serialize;
 use workloads::collision::families::{Case, cases, reference_cases, slide, triangles_boxes_touch};
-use workloads::collision::{Method, Search, Sweeps, candidates, detect};
+use workloads::collision::{CollisionMethod, PairSearch, Sweeps, candidates, detect};
 
-use crate::study::table::{Sheet, Table, fixed, millis, plain};
+use crate::study::table::{Sheet, TableBuilder, fixed, millis, plain};
 use crate::study::tradeoff::{Metric, TradeoffPoint};
 use crate::study::{Gallery, Study, StudyError};
 
@@ -34,7 +34,7 @@ pub struct CcdEffort {
 
 /// A method of collision detection.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Way {
+pub enum CcdMethod {
     /// By the boxes that whole objects sweep.
     ObjectBoxes,
     /// By the boxes that triangles sweep.
@@ -42,27 +42,31 @@ pub enum Way {
     /// By two sweeps over all objects along each axis, as in the paper.
     Sweeps(Sweeps),
     /// By images of each pair.
-    Images(Search),
+    Images(PairSearch),
 }
 
-impl Way {
-    /// Its name in the tables.
+impl CcdMethod {
+    /// Name of the method in the tables.
     pub fn name(&self) -> String {
         match self {
             Self::ObjectBoxes => "swept boxes of objects".to_owned(),
             Self::TriangleBoxes => "swept boxes of triangles".to_owned(),
             Self::Sweeps(Sweeps { bins, .. }) => format!("two sweeps, bins {bins}"),
-            Self::Images(Search { zoom: true, .. }) => "with refinement".to_owned(),
-            Self::Images(Search { method: Method::DepthOnly, .. }) => "depth only".to_owned(),
-            Self::Images(Search { method: Method::BoxBox, bins, .. }) => format!("box-box, bins {bins}"),
-            Self::Images(Search { bins, .. }) => format!("fragment-box, bins {bins}"),
+            Self::Images(PairSearch { zoom: true, .. }) => "with refinement".to_owned(),
+            Self::Images(PairSearch { method: CollisionMethod::DepthOnly, .. }) => "depth only".to_owned(),
+            Self::Images(PairSearch { method: CollisionMethod::BoxBox, bins, .. }) => {
+                format!("box-box, bins {bins}")
+            }
+            Self::Images(PairSearch { bins, .. }) => format!("fragment-box, bins {bins}"),
         }
     }
 
     /// Pixels across; none where there is no image.
     pub fn resolution(&self) -> u32 {
         match self {
-            Self::Images(Search { resolution, .. }) | Self::Sweeps(Sweeps { resolution, .. }) => *resolution,
+            Self::Images(PairSearch { resolution, .. }) | Self::Sweeps(Sweeps { resolution, .. }) => {
+                *resolution
+            }
             Self::ObjectBoxes | Self::TriangleBoxes => 0,
         }
     }
@@ -79,7 +83,7 @@ pub enum Set {
 }
 
 impl Set {
-    /// Its name in tables.
+    /// Name of the set in tables.
     pub fn name(self) -> &'static str {
         match self {
             Self::Families => "families",
@@ -143,35 +147,40 @@ fn all_cases(effort: &CcdEffort) -> Vec<Case> {
 const REFERENCE_PIXELS: u32 = 128;
 
 /// The ways of the reference cases.
-fn reference_ways(effort: &CcdEffort) -> Vec<Way> {
-    let once = Search { resolution: REFERENCE_PIXELS, bins: 1, method: Method::FragmentBox, zoom: false };
-    let depth_only = Search { method: Method::DepthOnly, ..once };
-    let binned = effort.reference_bins.iter().map(|&bins| Search { bins, ..once });
-    let images = [depth_only].into_iter().chain(binned).chain([Search::default()]).map(Way::Images);
+fn reference_ways(effort: &CcdEffort) -> Vec<CcdMethod> {
+    let once = PairSearch {
+        resolution: REFERENCE_PIXELS,
+        bins: 1,
+        method: CollisionMethod::FragmentBox,
+        zoom: false,
+    };
+    let depth_only = PairSearch { method: CollisionMethod::DepthOnly, ..once };
+    let binned = effort.reference_bins.iter().map(|&bins| PairSearch { bins, ..once });
+    let images = [depth_only].into_iter().chain(binned).chain([PairSearch::default()]).map(CcdMethod::Images);
     let sweeps = effort.reference_bins.iter().map(|&bins| sweeps(REFERENCE_PIXELS, bins));
-    [Way::ObjectBoxes, Way::TriangleBoxes].into_iter().chain(sweeps).chain(images).collect()
+    [CcdMethod::ObjectBoxes, CcdMethod::TriangleBoxes].into_iter().chain(sweeps).chain(images).collect()
 }
 
 /// Two sweeps over all objects.
-fn sweeps(resolution: u32, bins: u32) -> Way {
-    Way::Sweeps(Sweeps { method: Method::FragmentBox, resolution, bins })
+fn sweeps(resolution: u32, bins: u32) -> CcdMethod {
+    CcdMethod::Sweeps(Sweeps { method: CollisionMethod::FragmentBox, resolution, bins })
 }
 
 /// All ways, from the cheapest on.
-fn ways(effort: &CcdEffort) -> Vec<Way> {
-    let search = Search { resolution: 0, bins: 1, method: Method::FragmentBox, zoom: false };
+fn ways(effort: &CcdEffort) -> Vec<CcdMethod> {
+    let search = PairSearch { resolution: 0, bins: 1, method: CollisionMethod::FragmentBox, zoom: false };
     let each = effort.resolutions.iter().flat_map(|&resolution| {
-        let search = Search { resolution, ..search };
-        let binned = effort.bins.iter().map(move |&bins| Search { bins, ..search });
+        let search = PairSearch { resolution, ..search };
+        let binned = effort.bins.iter().map(move |&bins| PairSearch { bins, ..search });
         let others = [
-            Search { method: Method::DepthOnly, ..search },
-            Search { method: Method::BoxBox, ..search },
-            Search { zoom: true, bins: Search::default().bins, ..search },
+            PairSearch { method: CollisionMethod::DepthOnly, ..search },
+            PairSearch { method: CollisionMethod::BoxBox, ..search },
+            PairSearch { zoom: true, bins: PairSearch::default().bins, ..search },
         ];
         let swept = effort.bins.iter().map(move |&bins| sweeps(resolution, bins));
-        swept.chain(binned.chain(others).map(Way::Images))
+        swept.chain(binned.chain(others).map(CcdMethod::Images))
     });
-    [Way::ObjectBoxes, Way::TriangleBoxes].into_iter().chain(each).collect()
+    [CcdMethod::ObjectBoxes, CcdMethod::TriangleBoxes].into_iter().chain(each).collect()
 }
 
 impl Study for CcdChart {
@@ -234,7 +243,7 @@ impl Study for CcdChart {
 
     fn tables(&self) -> Vec<Sheet> {
         let ways = |set: Set, below: String| {
-            Table::of(self.rows.iter().filter(move |row| row.cases == set))
+            TableBuilder::of(self.rows.iter().filter(move |row| row.cases == set))
                 .shown("", |row| row.way.as_str(), plain)
                 .shown("px", |row| row.resolution, |px| if px == 0 { "-".to_owned() } else { px.to_string() })
                 .shown("two objects", |row| row.two, fixed(3))
@@ -246,11 +255,11 @@ impl Study for CcdChart {
         let families = ways(Set::Families, format!("{}\n", subject(&self.pairs)));
         let below = format!("{}, cases like the reference cases\n", subject(&self.reference_pairs));
         let reference = ways(Set::LikeReference, below);
-        let slides = Table::of(&self.slides)
+        let slides = TableBuilder::of(&self.slides)
             .shown("plates that slide: gap", |slide| slide.gap, |gap| format!("{gap:e}"))
             .shown("px", |slide| slide.resolution, plain)
             .shown("false positive rate", |slide| slide.kept, fixed(2));
-        let rows = Table::of(&self.rows)
+        let rows = TableBuilder::of(&self.rows)
             .data("cases", |row| row.cases.name())
             .data("way", |row| row.way.as_str())
             .data("resolution", |row| row.resolution)
@@ -362,7 +371,7 @@ fn pairs(cases: &[Case]) -> [[usize; 2]; 2] {
 }
 
 /// All cases by one way, on a thread of its own so that its time is its own.
-fn row(way: &Way, set: Set, cases: &[Case]) -> Result<CcdRow, StudyError> {
+fn row(way: &CcdMethod, set: Set, cases: &[Case]) -> Result<CcdRow, StudyError> {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
     Ok(pool.install(|| {
         let (mut vain, mut missed, mut candidates) = ([0; 2], 0, 0);
@@ -382,24 +391,24 @@ fn row(way: &Way, set: Set, cases: &[Case]) -> Result<CcdRow, StudyError> {
 }
 
 /// The pairs that are kept; counts those whose swept boxes touch.
-fn kept(way: &Way, case: &Case, touching: &mut u32) -> Vec<(usize, usize)> {
+fn kept(way: &CcdMethod, case: &Case, touching: &mut u32) -> Vec<(usize, usize)> {
     let objects = &case.objects;
     match way {
-        Way::Images(search) => {
+        CcdMethod::Images(search) => {
             let answers = detect(objects, search);
             *touching += answers.len() as u32;
             let kept = answers.into_iter().filter(|answer| answer.verdict.may_collide());
             kept.map(|answer| (answer.a, answer.b)).collect()
         }
-        Way::Sweeps(sweeps) => {
+        CcdMethod::Sweeps(sweeps) => {
             *touching += candidates(objects).len() as u32;
             sweeps.detect(objects).pairs(objects)
         }
-        Way::ObjectBoxes | Way::TriangleBoxes => {
+        CcdMethod::ObjectBoxes | CcdMethod::TriangleBoxes => {
             let mut pairs = candidates(objects);
             *touching += pairs.len() as u32;
             pairs.retain(|&(a, b)| {
-                *way == Way::ObjectBoxes || triangles_boxes_touch(&objects[a], &objects[b])
+                *way == CcdMethod::ObjectBoxes || triangles_boxes_touch(&objects[a], &objects[b])
             });
             pairs
         }
@@ -410,7 +419,7 @@ fn kept(way: &Way, case: &Case, touching: &mut u32) -> Vec<(usize, usize)> {
 fn slides(effort: &CcdEffort, progress: &Progress) -> Vec<Slide> {
     let bar = progress.bar("sliding plates", (effort.resolutions.len() * effort.gaps.len()) as u64);
     let each = effort.resolutions.iter().flat_map(|&resolution| {
-        effort.gaps.iter().map(move |&gap| (Search { resolution, ..Search::default() }, gap))
+        effort.gaps.iter().map(move |&gap| (PairSearch { resolution, ..PairSearch::default() }, gap))
     });
     let measured = each.map(|(search, gap)| {
         let kept = |seed: &usize| {

@@ -12,12 +12,12 @@ use power_model::{EnergyTable, Platform, PowerModel};
 use rayon::prelude::*;
 use run::{GpuSpec, JobFrame, RunError};
 use serde::Serialize;
-use workloads::deferred::{Deferred, DeferredOptions, LightPass, Method, NormalFormat, Rate};
+use workloads::deferred::{Deferred, DeferredOptions, LightPass, LightingMethod, LightingRate, NormalFormat};
 use workloads::scene::{Local, Node, Parts, Rig, Scene, SceneCamera, Trs};
 use workloads::{Alpha, Material, Overrides, shapes};
 
 use crate::chart::{errors, mean_square};
-use crate::study::table::{Sheet, Table, count, fixed, plain};
+use crate::study::table::{Sheet, TableBuilder, count, fixed, plain};
 use crate::study::tradeoff::{Metric, TradeoffPoint};
 use crate::study::{Gallery, Study, StudyError};
 
@@ -42,7 +42,7 @@ const SAME: f64 = 1e-9;
 /// What varies.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Sweep {
+pub enum DeferredSweep {
     /// Point lights in the built-in scene.
     Lights,
     /// Opaque layers over the whole image, the farthest first.
@@ -53,7 +53,7 @@ pub enum Sweep {
     Samples,
 }
 
-impl Sweep {
+impl DeferredSweep {
     const ALL: [Self; 4] = [Self::Lights, Self::Layers, Self::Blended, Self::Samples];
 
     const fn name(self) -> &'static str {
@@ -79,27 +79,27 @@ impl Sweep {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Way {
     name: &'static str,
-    method: Method,
+    method: LightingMethod,
     lighting: LightPass,
     normals: NormalFormat,
-    rate: Rate,
+    rate: LightingRate,
 }
 
 /// Every way; the first is the reference.
 const WAYS: [Way; 5] = {
     let deferred = Way {
         name: "deferred",
-        method: Method::Deferred,
+        method: LightingMethod::Deferred,
         lighting: LightPass::Screen,
         normals: NormalFormat::Rgba16f,
-        rate: Rate::Sample,
+        rate: LightingRate::Sample,
     };
     [
-        Way { name: "forward", method: Method::Forward, ..deferred },
+        Way { name: "forward", method: LightingMethod::Forward, ..deferred },
         deferred,
         Way { name: "light volumes", lighting: LightPass::Volumes, ..deferred },
         Way { name: "normals in bytes", normals: NormalFormat::Rgba8, ..deferred },
-        Way { name: "lit once a pixel", rate: Rate::Pixel, ..deferred },
+        Way { name: "lit once a pixel", rate: LightingRate::Pixel, ..deferred },
     ]
 };
 
@@ -107,8 +107,8 @@ const WAYS: [Way; 5] = {
 #[derive(Clone, Debug, Serialize)]
 pub struct DeferredRow {
     /// What varies.
-    pub sweep: Sweep,
-    /// Its value.
+    pub sweep: DeferredSweep,
+    /// Value of the varied setting.
     pub value: u32,
     /// The way.
     pub method: &'static str,
@@ -150,13 +150,13 @@ impl Study for DeferredChart {
         DeferredEffort { size: (160, 90), max_lights: 64, max_layers_and_samples: 4 };
 
     fn measure(effort: DeferredEffort, _: &[String], progress: &Progress) -> Result<Self, StudyError> {
-        let cases: Vec<(Sweep, u32)> = Sweep::ALL
+        let cases: Vec<(DeferredSweep, u32)> = DeferredSweep::ALL
             .into_iter()
             .flat_map(|sweep| sweep.values(effort).into_iter().map(move |value| (sweep, value)))
             .collect();
         let bench = Bench::new(effort)?;
         let bar = progress.bar("deferred", cases.len() as u64);
-        let rows = |&(sweep, value): &(Sweep, u32)| {
+        let rows = |&(sweep, value): &(DeferredSweep, u32)| {
             let rows = bench.rows(sweep, value);
             bar.inc();
             rows
@@ -169,26 +169,26 @@ impl Study for DeferredChart {
         let (width, height) = self.effort.size;
         let subject = format!("a frame of {width}x{height} pixels on the GPU hd_4000");
         let gains = vec![
-            self.panel(Sweep::Lights, "frame (ms)", milliseconds),
-            self.panel(Sweep::Lights, "energy (mJ)", millijoules),
-            self.panel(Sweep::Lights, "memory (MB)", megabytes),
-            self.panel(Sweep::Layers, "frame (ms)", milliseconds),
-            self.panel(Sweep::Layers, "energy (mJ)", millijoules),
-            self.panel(Sweep::Layers, "memory (MB)", megabytes),
+            self.panel(DeferredSweep::Lights, "frame (ms)", milliseconds),
+            self.panel(DeferredSweep::Lights, "energy (mJ)", millijoules),
+            self.panel(DeferredSweep::Lights, "memory (MB)", megabytes),
+            self.panel(DeferredSweep::Layers, "frame (ms)", milliseconds),
+            self.panel(DeferredSweep::Layers, "energy (mJ)", millijoules),
+            self.panel(DeferredSweep::Layers, "memory (MB)", megabytes),
         ];
         to.chart("deferred", ["Deferred and forward rendering", &subject], gains)?;
         let several = || Some(1.5..f64::INFINITY);
         let failures = vec![
-            self.panel(Sweep::Samples, "memory (MB)", megabytes),
-            self.panel(Sweep::Samples, "RMSE", |row| row.rmse)
+            self.panel(DeferredSweep::Samples, "memory (MB)", megabytes),
+            self.panel(DeferredSweep::Samples, "RMSE", |row| row.rmse)
                 .failing(several(), "a run warns: deferred-one-surface"),
-            self.panel(Sweep::Blended, "frame (ms)", milliseconds),
+            self.panel(DeferredSweep::Blended, "frame (ms)", milliseconds),
         ];
         to.chart("deferred_failures", ["Where deferred rendering fails", &subject], failures)
     }
 
     fn tables(&self) -> Vec<Sheet> {
-        let rows = Table::of(&self.rows)
+        let rows = TableBuilder::of(&self.rows)
             .column("sweep", "varies", |row| row.sweep.name(), plain)
             .column("value", "value", |row| row.value, plain)
             .column("method", "method", |row| row.method, plain)
@@ -203,8 +203,10 @@ impl Study for DeferredChart {
     }
 
     fn tradeoff(&self) -> Vec<TradeoffPoint> {
-        let most = self.rows.iter().filter(|row| row.sweep == Sweep::Lights).map(|row| row.value).max();
-        let of_most = self.rows.iter().filter(|row| row.sweep == Sweep::Lights && Some(row.value) == most);
+        let most =
+            self.rows.iter().filter(|row| row.sweep == DeferredSweep::Lights).map(|row| row.value).max();
+        let of_most =
+            self.rows.iter().filter(|row| row.sweep == DeferredSweep::Lights && Some(row.value) == most);
         let point = |row: &DeferredRow| {
             let bytes = Metric::new("G-buffer", "B/pixel", row.g_buffer_bytes);
             TradeoffPoint::new("deferred image", ["G-buffer", row.method], [Metric::rmse(row.rmse), bytes])
@@ -235,7 +237,7 @@ fn megabytes(row: &DeferredRow) -> f64 {
 }
 
 impl DeferredChart {
-    fn panel(&self, sweep: Sweep, name: &str, of: fn(&DeferredRow) -> f64) -> ChartPanel {
+    fn panel(&self, sweep: DeferredSweep, name: &str, of: fn(&DeferredRow) -> f64) -> ChartPanel {
         let curve = |way: &Way| {
             let rows = self.rows.iter().filter(|row| (row.sweep, row.method) == (sweep, way.name));
             Series::curve(way.name, rows.map(|row| (f64::from(row.value), of(row))))
@@ -261,9 +263,10 @@ impl Bench {
     }
 
     /// Every way that differs at a value.
-    fn rows(&self, sweep: Sweep, value: u32) -> Result<Vec<DeferredRow>, RunError> {
-        let ways =
-            WAYS.iter().filter(|way| way.rate == Rate::Sample || (sweep == Sweep::Samples && value > 1));
+    fn rows(&self, sweep: DeferredSweep, value: u32) -> Result<Vec<DeferredRow>, RunError> {
+        let ways = WAYS
+            .iter()
+            .filter(|way| way.rate == LightingRate::Sample || (sweep == DeferredSweep::Samples && value > 1));
         let mut wanted: Option<Vec<Vec3>> = None;
         let row = |way: &Way| {
             let frame = JobFrame::new(&self.job(sweep, value, way)?, 0, &self.gpu, &self.model)?;
@@ -287,18 +290,18 @@ impl Bench {
         ways.map(row).collect()
     }
 
-    fn job(&self, sweep: Sweep, value: u32, way: &Way) -> Result<Deferred, RunError> {
-        let lights = if sweep == Sweep::Lights { value } else { LIGHTS };
-        let samples = if sweep == Sweep::Samples { value } else { 1 };
+    fn job(&self, sweep: DeferredSweep, value: u32, way: &Way) -> Result<Deferred, RunError> {
+        let lights = if sweep == DeferredSweep::Lights { value } else { LIGHTS };
+        let samples = if sweep == DeferredSweep::Samples { value } else { 1 };
         let Way { method, lighting, normals, rate, .. } = *way;
         let options =
             DeferredOptions { method, lighting, normals, rate, lights, ..DeferredOptions::default() };
         let overrides =
             Overrides { size: Some(self.effort.size), samples: Some(samples), ..Overrides::default() };
         let scene = match sweep {
-            Sweep::Lights | Sweep::Samples => workloads::load(&options.scene)?,
-            Sweep::Layers => layers(value, Alpha::Opaque)?,
-            Sweep::Blended => layers(value, Alpha::Blended)?,
+            DeferredSweep::Lights | DeferredSweep::Samples => workloads::load(&options.scene)?,
+            DeferredSweep::Layers => layers(value, Alpha::Opaque)?,
+            DeferredSweep::Blended => layers(value, Alpha::Blended)?,
         };
         Ok(Deferred::of(scene, options, &overrides, 1)?)
     }
@@ -335,16 +338,19 @@ mod tests {
             let is_it = |row: &&DeferredRow| (row.sweep, row.value, row.method) == (sweep, value, method);
             chart.rows.iter().find(is_it).unwrap()
         };
-        let ops = |layers, method| find(Sweep::Layers, layers, method).shader_ops as f64;
+        let ops = |layers, method| find(DeferredSweep::Layers, layers, method).shader_ops as f64;
         assert!(ops(4, "forward") > 3.5 * ops(1, "forward"));
         assert!(ops(4, "deferred") < 1.5 * ops(1, "deferred"));
-        let bytes = |samples| find(Sweep::Samples, samples, "deferred").g_buffer_bytes;
+        let bytes = |samples| find(DeferredSweep::Samples, samples, "deferred").g_buffer_bytes;
         assert_eq!(bytes(4), 4.0 * bytes(1));
-        let rmse = |method| find(Sweep::Samples, 4, method).rmse;
+        let rmse = |method| find(DeferredSweep::Samples, 4, method).rmse;
         assert!(rmse("lit once a pixel") > 2.0 * rmse("deferred"));
-        assert!(find(Sweep::Lights, 16, "normals in bytes").rmse > find(Sweep::Lights, 16, "deferred").rmse);
+        assert!(
+            find(DeferredSweep::Lights, 16, "normals in bytes").rmse
+                > find(DeferredSweep::Lights, 16, "deferred").rmse
+        );
         // Blended layers are lit forward either way, so nothing is gained.
-        let blended = |method| find(Sweep::Blended, 4, method).shader_ops;
+        let blended = |method| find(DeferredSweep::Blended, 4, method).shader_ops;
         assert!(blended("deferred") > blended("forward"));
     }
 }

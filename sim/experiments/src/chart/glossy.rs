@@ -15,12 +15,12 @@ use pipeline::sampling::SampleSource;
 use pipeline::{Cull, Draw, Geometry, Gpu, LensShape, SampleSpec, SampleTable};
 use run::GpuSpec;
 use serde::Serialize;
-use workloads::accumulation::{RayWork, Rays, SharedSamples};
-use workloads::glossy::{Effect, Lobe, Map, default_scene, receiver};
+use workloads::accumulation::{RayCaster, RayWork, SharedSamples};
+use workloads::glossy::{GlossyEffect, Lobe, Map, default_scene, receiver};
 use workloads::{Frame, Scene};
 
 use crate::chart::{White, errors, mean_square};
-use crate::study::table::{Sheet, Table, count, fixed, plain};
+use crate::study::table::{Sheet, TableBuilder, count, fixed, plain};
 use crate::study::tradeoff::{Metric, TradeoffPoint};
 use crate::study::{Gallery, Ran, Study, StudyError};
 
@@ -38,8 +38,8 @@ pub struct GlossyEffort {
 /// Radius of the lens where it does not vary, scene units.
 const ROUGHNESS: f64 = 0.25;
 /// Both effects, each with its name.
-const EFFECTS: [(&str, Effect); 2] =
-    [("reflection", Effect::Reflection), ("refraction", Effect::Refraction(1.33))];
+const EFFECTS: [(&str, GlossyEffect); 2] =
+    [("reflection", GlossyEffect::Reflection), ("refraction", GlossyEffect::Refraction(1.33))];
 
 /// Everything the chart found.
 #[derive(Clone, Debug, Serialize)]
@@ -71,14 +71,14 @@ impl Study for GlossyChart {
         let bar = progress.bar("glossy", (EFFECTS.len() * counts.len() + 2) as u64);
         let mut rows = Vec::new();
         for effect in EFFECTS {
-            let bench = Bench::new(effect, effort)?;
+            let bench = GlossyBench::new(effect, effort)?;
             let reference = bench.reference(ROUGHNESS)?;
             for &samples in &counts {
                 rows.push(bench.row(samples, &reference)?);
                 bar.inc();
             }
         }
-        let bench = Bench::new(EFFECTS[0], effort)?;
+        let bench = GlossyBench::new(EFFECTS[0], effort)?;
         let blurs = bench.blurs()?;
         bar.inc();
         let wides = bench.wides()?;
@@ -100,7 +100,7 @@ impl Study for GlossyChart {
     }
 
     fn tables(&self) -> Vec<Sheet> {
-        let rows = Table::of(&self.rows)
+        let rows = TableBuilder::of(&self.rows)
             .column("effect", "effect", |row| row.effect, plain)
             .column("samples", "samples", |row| row.samples, plain)
             .column("rmse", "RMSE", |row| row.rmse, fixed(5))
@@ -115,11 +115,11 @@ impl Study for GlossyChart {
             .column("traced_host_s", "(host s)", |row| row.traced.host_s, fixed(3))
             .column("nodes_per_ray", "nodes a ray", |row| row.traced.nodes_per_ray, fixed(1))
             .column("triangles_per_ray", "triangles a ray", |row| row.traced.triangles_per_ray, fixed(1));
-        let blurs = Table::of(&self.blurs)
+        let blurs = TableBuilder::of(&self.blurs)
             .shown("height", |blur| blur.height, plain)
             .shown("blur", |blur| blur.width, fixed(4))
             .shown("expected", |blur| blur.expected, fixed(4));
-        let wides = Table::of(&self.wides)
+        let wides = TableBuilder::of(&self.wides)
             .shown("lens over half of the receiver", |wide| wide.over_half, plain)
             .shown("RMSE of 16 samples", |wide| wide.rmse_of_samples, fixed(4))
             .shown("RMSE of the lobe", |wide| wide.rmse_of_lobe, fixed(4));
@@ -232,18 +232,18 @@ pub struct GlossyRow {
     pub accumulated_rmse: f64,
     /// Vertex shader runs of one pass.
     pub vertices: u64,
-    /// Those of accumulation.
+    /// Vertex shader runs of accumulation.
     pub accumulated_vertices: u64,
     /// Samples tested in one pass.
     pub samples_tested: u64,
-    /// Those of accumulation.
+    /// Samples tested in accumulation.
     pub accumulated_samples_tested: u64,
     /// Passes, draws and fragments of both.
     #[serde(skip)]
     pub ran: Ran,
     /// Seconds of the host for one pass.
     pub host_s: f64,
-    /// Those for accumulation.
+    /// Seconds of the host for accumulation.
     pub accumulated_host_s: f64,
     /// Ray tracing with the samples of the one pass.
     pub traced: Traced,
@@ -252,7 +252,7 @@ pub struct GlossyRow {
 /// An image by ray tracing.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct Traced {
-    /// Its error.
+    /// Error of the image.
     pub rmse: f64,
     /// Boxes and triangles tested.
     pub tests: u64,
@@ -283,9 +283,9 @@ impl Traced {
 pub struct Blur {
     /// Above the plane, scene units.
     pub height: f64,
-    /// Its width on the plane as found in the map, scene units.
+    /// Width of the blur on the plane as found in the map, scene units.
     pub width: f64,
-    /// That of geometry.
+    /// Width by geometry.
     pub expected: f64,
 }
 
@@ -302,11 +302,11 @@ pub struct Wide {
 }
 
 /// The stage for an effect.
-pub struct Bench {
+pub struct GlossyBench {
     scene: Scene,
     frame: Frame,
     gpu: GpuSpec,
-    effect: (&'static str, Effect),
+    effect: (&'static str, GlossyEffect),
     effort: GlossyEffort,
     radius: f64,
 }
@@ -319,13 +319,13 @@ const RADII: [f64; 7] = [0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 4.0];
 /// Samples of a texel where radii are compared.
 const FEW: u32 = 16;
 
-impl Bench {
+impl GlossyBench {
     /// The stage.
     ///
     /// # Errors
     /// None that is expected.
-    pub fn new(effect: (&'static str, Effect), effort: GlossyEffort) -> Result<Self, StudyError> {
-        let scene = default_scene(effect.1 != Effect::Reflection)?;
+    pub fn new(effect: (&'static str, GlossyEffect), effort: GlossyEffort) -> Result<Self, StudyError> {
+        let scene = default_scene(effect.1 != GlossyEffect::Reflection)?;
         let frame = scene.frame(0)?;
         Ok(Self { scene, frame, gpu: GpuSpec::load("reference")?, effect, effort, radius: ROUGHNESS })
     }
@@ -372,7 +372,7 @@ impl Bench {
     ) -> Result<(Vec<Vec3>, RayWork), StudyError> {
         let colour = |mesh: &workloads::FrameMesh| self.scene.materials()[mesh.material].base_color;
         let colours: Vec<Vec3> = self.frame.meshes.iter().map(colour).collect();
-        let rays = Rays::new(&self.draws()?);
+        let rays = RayCaster::new(&self.draws()?);
         Ok(map.by_rays((&rays, &colours), tables, self.scene.background(), lobe))
     }
 

@@ -8,14 +8,14 @@ use output::OutputError;
 use output::plot::{ChartPanel, Scale, Series};
 use output::terminal::Progress;
 use pipeline::sampling::HashedSamples;
-use pipeline::visibility::{SampleLayout, Tally, Visibility, resolve};
+use pipeline::visibility::{SampleLayout, StepTally, Visibility, resolve};
 use pipeline::{Cull, Geometry, LensShape};
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use serde::Serialize;
 use workloads::stress::{Size, Soup, StressError, StressScene};
 
 use super::{exponent, upper_half};
-use crate::study::table::{Sheet, Table, fixed, millis, optional, plain};
+use crate::study::table::{Sheet, TableBuilder, fixed, millis, optional, plain};
 use crate::study::{Gallery, Study, StudyError};
 
 /// Effort of the measurement.
@@ -49,7 +49,7 @@ pub struct Base {
 /// The quantity that grows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Sweep {
+pub enum GrowthSweep {
     /// Triangles that cover the same area, finer and finer.
     Triangles,
     /// Samples in a pixel.
@@ -61,7 +61,7 @@ pub enum Sweep {
 /// The source of blur.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Kind {
+pub enum GrowthBlur {
     /// Nothing.
     Still,
     /// Motion: three dimensions.
@@ -76,9 +76,9 @@ pub enum Kind {
 #[derive(Clone, Debug, Serialize)]
 pub struct GrowthRow {
     /// The quantity that grows.
-    pub sweep: Sweep,
+    pub sweep: GrowthSweep,
     /// The source of blur.
-    pub kind: Kind,
+    pub kind: GrowthBlur,
     /// Exponent of time over what grows, from `fitted_from` on.
     pub exponent: Option<f64>,
     /// Exponent of the number of sample tests, likewise.
@@ -86,7 +86,7 @@ pub struct GrowthRow {
     /// Where the upper half of the curve begins on its logarithmic axis.
     pub fitted_from: f64,
     /// From little to much.
-    pub points: Vec<Point>,
+    pub points: Vec<GrowthPoint>,
 }
 
 /// Everything the chart found.
@@ -98,10 +98,10 @@ pub struct GrowthChart {
     pub rows: Vec<GrowthRow>,
 }
 
-impl Sweep {
+impl GrowthSweep {
     const ALL: [Self; 3] = [Self::Triangles, Self::Samples, Self::Blur];
 
-    /// Its name in tables.
+    /// Name of the sweep in tables.
     pub fn name(self) -> &'static str {
         match self {
             Self::Triangles => "triangles",
@@ -111,7 +111,7 @@ impl Sweep {
     }
 
     /// The value of a point that grows.
-    pub fn of(self, point: &Point) -> f64 {
+    pub fn of(self, point: &GrowthPoint) -> f64 {
         match self {
             Self::Triangles => f64::from(point.triangles),
             Self::Samples => f64::from(point.samples_per_pixel),
@@ -130,10 +130,10 @@ impl Sweep {
     }
 }
 
-impl Kind {
+impl GrowthBlur {
     const ALL: [Self; 4] = [Self::Still, Self::Motion, Self::Defocus, Self::Both];
 
-    /// Its name in tables and pictures.
+    /// Name of the kind in tables and pictures.
     pub fn name(self) -> &'static str {
         match self {
             Self::Still => "still",
@@ -180,12 +180,13 @@ impl Study for GrowthChart {
     };
 
     fn measure(effort: GrowthEffort, _scenes: &[String], progress: &Progress) -> Result<Self, StudyError> {
-        let curves = || Sweep::ALL.into_iter().flat_map(|sweep| Kind::ALL.map(|kind| (sweep, kind)));
+        let curves =
+            || GrowthSweep::ALL.into_iter().flat_map(|sweep| GrowthBlur::ALL.map(|kind| (sweep, kind)));
         // What stands still has no blur to sweep.
-        let curves = || curves().filter(|curve| *curve != (Sweep::Blur, Kind::Still));
+        let curves = || curves().filter(|curve| *curve != (GrowthSweep::Blur, GrowthBlur::Still));
         let steps: usize = curves().map(|(sweep, _)| sweep.trials(&effort).len()).sum();
         let (bar, timer) = (progress.bar("growth", steps as u64), Timer::new(&effort)?);
-        let row = |(sweep, kind): (Sweep, Kind)| {
+        let row = |(sweep, kind): (GrowthSweep, GrowthBlur)| {
             let point = |trial: Base| {
                 let point = timer.point(trial, kind);
                 bar.inc();
@@ -199,12 +200,12 @@ impl Study for GrowthChart {
     }
 
     fn draw(&self, to: &Gallery<'_>) -> Result<(), OutputError> {
-        let panels = Sweep::ALL.map(|sweep| self.panel(sweep)).into();
+        let panels = GrowthSweep::ALL.map(|sweep| self.panel(sweep)).into();
         to.chart("growth", ["Time of the visibility engine", &self.subject()], panels)
     }
 
     fn tables(&self) -> Vec<Sheet> {
-        let exponents = Table::of(&self.rows)
+        let exponents = TableBuilder::of(&self.rows)
             .shown("growing", |row| row.sweep.name(), plain)
             .shown("what blurs", |row| row.kind.name(), plain)
             .shown("exponent of time", |row| row.exponent, optional(fixed(2)))
@@ -214,7 +215,7 @@ impl Study for GrowthChart {
             .shown("ms, last", |row| row.points.last().map(|point| point.cpu_s), optional(millis(2)))
             .after(format!("\n{}\n", self.subject()));
         let each = self.rows.iter().flat_map(|row| row.points.iter().map(move |point| (row, point)));
-        let points = Table::of(each)
+        let points = TableBuilder::of(each)
             .data("sweep", |(row, _)| row.sweep.name())
             .data("kind", |(row, _)| row.kind.name())
             .data("exponent", |(row, _)| row.exponent)
@@ -240,7 +241,7 @@ impl GrowthChart {
         )
     }
 
-    fn panel(&self, sweep: Sweep) -> ChartPanel {
+    fn panel(&self, sweep: GrowthSweep) -> ChartPanel {
         let base = &self.effort.base;
         let (triangles, samples, blur) = (
             format!("{} triangles", base.triangles),
@@ -248,17 +249,17 @@ impl GrowthChart {
             format!("blur {} px", base.blur_px),
         );
         let (across, title) = match sweep {
-            Sweep::Triangles => ("triangles", format!("{samples}, {blur}")),
-            Sweep::Samples => ("samples a pixel", format!("{triangles}, {blur}")),
-            Sweep::Blur => ("motion or circle of confusion (px)", format!("{triangles}, {samples}")),
+            GrowthSweep::Triangles => ("triangles", format!("{samples}, {blur}")),
+            GrowthSweep::Samples => ("samples a pixel", format!("{triangles}, {blur}")),
+            GrowthSweep::Blur => ("motion or circle of confusion (px)", format!("{triangles}, {samples}")),
         };
-        let scale = if sweep == Sweep::Triangles { Scale::Decades } else { Scale::Doublings };
-        let curves = Kind::ALL.map(|kind| self.curve(sweep, kind)).into();
+        let scale = if sweep == GrowthSweep::Triangles { Scale::Decades } else { Scale::Doublings };
+        let curves = GrowthBlur::ALL.map(|kind| self.curve(sweep, kind)).into();
         ChartPanel::new(&title, [across, "CPU time (ms)"], curves).on(scale, Scale::Decades)
     }
 
     /// A curve without points where there is none, so that the others keep their colours.
-    fn curve(&self, sweep: Sweep, kind: Kind) -> Series {
+    fn curve(&self, sweep: GrowthSweep, kind: GrowthBlur) -> Series {
         let row = self.rows.iter().find(|row| row.sweep == sweep && row.kind == kind);
         let points = row.iter().flat_map(|row| &row.points);
         let note = row.and_then(|row| row.exponent).map_or(String::new(), |p| format!("{p:.2}"));
@@ -270,11 +271,11 @@ impl GrowthChart {
 }
 
 impl GrowthRow {
-    fn new(sweep: Sweep, kind: Kind, points: Vec<Point>) -> Self {
+    fn new(sweep: GrowthSweep, kind: GrowthBlur, points: Vec<GrowthPoint>) -> Self {
         let across = || points.iter().map(|point| sweep.of(point)).filter(|x| *x > 0.0);
         let ends = across().reduce(f64::min).zip(across().reduce(f64::max));
         let fitted_from = ends.map_or(0.0, |(low, high)| upper_half(low, high));
-        let fit = |of: fn(&Point) -> f64| {
+        let fit = |of: fn(&GrowthPoint) -> f64| {
             let all = points.iter().map(|point| (sweep.of(point), of(point)));
             exponent(all.filter(|(x, _)| *x >= fitted_from))
         };
@@ -291,7 +292,7 @@ impl GrowthRow {
 
 /// One measurement.
 #[derive(Clone, Copy, Debug, Serialize)]
-pub struct Point {
+pub struct GrowthPoint {
     /// Triangles.
     pub triangles: u32,
     /// Samples in a pixel.
@@ -324,12 +325,12 @@ impl<'a> Timer<'a> {
         Ok(Self { effort, thread: ThreadPoolBuilder::new().num_threads(1).build()? })
     }
 
-    pub fn point(&self, trial: Base, kind: Kind) -> Result<Point, StudyError> {
+    pub fn point(&self, trial: Base, kind: GrowthBlur) -> Result<GrowthPoint, StudyError> {
         let [motion_px, defocus_px] = kind.blur_px(trial.blur_px);
         let size = Size { side_px: self.effort.side_px, triangles: trial.triangles };
         let scene = Soup { size, layers: LAYERS, motion_px, defocus_px }.scene(SEED)?;
         let (cpu_s, tally) = self.time(&scene, trial.samples)?;
-        Ok(Point {
+        Ok(GrowthPoint {
             triangles: trial.triangles,
             samples_per_pixel: trial.samples,
             motion_px,
@@ -340,7 +341,7 @@ impl<'a> Timer<'a> {
         })
     }
 
-    fn time(&self, scene: &StressScene, samples: u32) -> Result<(f64, Tally), StudyError> {
+    fn time(&self, scene: &StressScene, samples: u32) -> Result<(f64, StepTally), StudyError> {
         let refused = |what: &str| StudyError::Pipeline(what.to_owned());
         let samples = HashedSamples::new(SEED, self.effort.side_px, samples, LensShape::Disk)
             .ok_or_else(|| refused("1 to 256 samples a pixel"))?;
@@ -379,9 +380,17 @@ mod tests {
         base: Base { triangles: 50, samples: 4, blur_px: 4.0 },
     };
 
-    fn point(triangles: u32, cpu_s: f64) -> Point {
+    fn point(triangles: u32, cpu_s: f64) -> GrowthPoint {
         let (motion_px, defocus_px) = (0.0, 0.0);
-        Point { triangles, samples_per_pixel: 1, motion_px, defocus_px, cpu_s, sample_tests: 7, hits: 0 }
+        GrowthPoint {
+            triangles,
+            samples_per_pixel: 1,
+            motion_px,
+            defocus_px,
+            cpu_s,
+            sample_tests: 7,
+            hits: 0,
+        }
     }
 
     #[test]
@@ -389,11 +398,11 @@ mod tests {
         // A floor of 1 s up to a hundred, beyond it n^1.5.
         let time = |n: u32| (n, f64::from(n).powf(1.5) / 1e3);
         let points = [1, 10, 100, 1_000, 10_000].map(time).map(|(n, s)| point(n, s.max(1.0)));
-        let row = GrowthRow::new(Sweep::Triangles, Kind::Still, points.into());
+        let row = GrowthRow::new(GrowthSweep::Triangles, GrowthBlur::Still, points.into());
         assert!((row.fitted_from - 100.0).abs() < 1e-9);
         assert!((row.exponent.unwrap() - 1.5).abs() < 1e-12, "{:?}", row.exponent);
         assert!(row.tests_exponent.unwrap().abs() < 1e-12);
-        assert_eq!(GrowthRow::new(Sweep::Triangles, Kind::Still, Vec::new()).exponent, None);
+        assert_eq!(GrowthRow::new(GrowthSweep::Triangles, GrowthBlur::Still, Vec::new()).exponent, None);
     }
 
     #[test]
@@ -410,7 +419,7 @@ mod tests {
         assert_eq!(tests(&chart), tests(&with(3)));
         for row in &chart.rows {
             assert!(row.points.iter().all(|point| point.cpu_s > 0.0 && point.hits > 0), "{row:?}");
-            if row.sweep == Sweep::Blur {
+            if row.sweep == GrowthSweep::Blur {
                 let [still, .., much] = &row.points[..] else { panic!("{row:?}") };
                 assert_eq!(still.motion_px + still.defocus_px, 0.0);
                 assert!(much.sample_tests > still.sample_tests, "{row:?}");

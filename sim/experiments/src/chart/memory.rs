@@ -2,7 +2,7 @@
 
 use activity::{Event, Unit};
 use output::OutputError;
-use output::plot::{AxisSpec, ChartPanel, Mark, Paint, Scale, Series};
+use output::plot::{AxisSpec, ChartPanel, Paint, PlotMark, Scale, Series};
 use output::terminal::Progress;
 use pipeline::CacheSpec;
 use power_model::Part;
@@ -11,7 +11,7 @@ use run::{GpuSpec, Plan, RunError, RunFrame, RunOptions, frames_of};
 use serde::Serialize;
 use workloads::Overrides;
 
-use crate::study::table::{Sheet, Table, fixed, plain, share};
+use crate::study::table::{Sheet, TableBuilder, fixed, plain, share};
 use crate::study::{Gallery, Study, StudyError};
 
 /// Drawn: a scene of one pass, and a workload whose passes read what earlier ones wrote.
@@ -42,7 +42,7 @@ pub struct MemoryRow {
     pub work: &'static str,
     /// The level whose size changes.
     pub level: &'static str,
-    /// Its size in megabytes of 1,048,576 bytes.
+    /// Size of the level in megabytes of 1,048,576 bytes.
     pub size_mb: f64,
     /// Bytes read from and written to memory.
     pub dram_bytes: u64,
@@ -105,7 +105,7 @@ impl Study for MemoryChart {
             let (MemoryRow { work, level, .. }, best) = (&rows[0], pays_up_to(rows));
             format!("\n{level} for {work}: the energy of a frame stops falling at {best} MB")
         });
-        let rows = Table::of(&self.rows)
+        let rows = TableBuilder::of(&self.rows)
             .column("work", "work", |row| row.work, plain)
             .column("level", "level", |row| row.level, plain)
             .column("size_mb", "MB", |row| row.size_mb, plain)
@@ -207,7 +207,7 @@ impl MemoryChart {
         let series = self.sweeps().enumerate().map(|(number, rows)| {
             let points = rows.iter().map(|row| (row.size_mb * BYTES_PER_MB, of(row))).collect();
             let label = format!("{} ({})", rows[0].level, rows[0].work);
-            Series::new(&label, Mark::Curve(points)).painted(Paint::Like(number))
+            Series::new(&label, PlotMark::Curve(points)).painted(Paint::Like(number))
         });
         let across = AxisSpec {
             name: "size of the level".to_owned(),

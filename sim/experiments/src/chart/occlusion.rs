@@ -17,7 +17,7 @@ use serde::Serialize;
 use workloads::occlusion::{MAX_HALF_COVERED_SHARE, WallScene, WallSceneSpec, depths_of};
 use workloads::visibility::Unshaded;
 
-use crate::study::table::{Sheet, Table, fixed, optional, plain};
+use crate::study::table::{Sheet, TableBuilder, fixed, optional, plain};
 use crate::study::tradeoff::{Metric, TradeoffPoint};
 use crate::study::{Gallery, Ran, Study, StudyError};
 
@@ -41,7 +41,7 @@ pub struct OcclusionEffort {
 /// The source of blur.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Kind {
+pub enum OcclusionBlur {
     /// Walls and what is behind them move.
     Motion,
     /// All is out of focus.
@@ -50,11 +50,11 @@ pub enum Kind {
     Both,
 }
 
-impl Kind {
+impl OcclusionBlur {
     /// Every kind.
     pub const ALL: [Self; 3] = [Self::Motion, Self::Defocus, Self::Both];
 
-    /// Its name in tables and pictures.
+    /// Name of the kind in tables and pictures.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Motion => "motion",
@@ -68,7 +68,7 @@ impl Kind {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct OcclusionRow {
     /// The source of blur.
-    pub kind: Kind,
+    pub kind: OcclusionBlur,
     /// Slats of a wall.
     pub slats: u32,
     /// Samples in a pixel.
@@ -79,9 +79,9 @@ pub struct OcclusionRow {
     pub boxes: Option<[u32; 3]>,
     /// Objects.
     pub objects: u64,
-    /// Of these hidden from every sample.
+    /// Objects hidden from every sample.
     pub hidden: u64,
-    /// Of these found.
+    /// Hidden objects that were found.
     pub found: u64,
     /// Objects called hidden that a sample sees: there must be none.
     pub wrong: u64,
@@ -151,7 +151,7 @@ impl Study for OcclusionChart {
         let samples = self.effort.samples[0];
         let title = "Occlusion queries: by intervals and by samples";
         let subject = self.subject();
-        to.chart("occlusion", [title, &subject], Kind::ALL.map(|kind| self.rates(kind)).into())?;
+        to.chart("occlusion", [title, &subject], OcclusionBlur::ALL.map(|kind| self.rates(kind)).into())?;
         let title = "Where occlusion queries fail: many small occluders";
         let subject = format!(
             "walls of more and narrower slats, {:.0} % of a wall being gaps; motion, {samples} samples a pixel, 8 boxes of time. Marked: where a \
@@ -163,7 +163,7 @@ impl Study for OcclusionChart {
     }
 
     fn tables(&self) -> Vec<Sheet> {
-        let rows = Table::of(self.rows())
+        let rows = TableBuilder::of(self.rows())
             .column("kind", "blur", |row| row.kind.name(), plain)
             .column("slats", "slats", |row| row.slats, plain)
             .column("samples", "samples", |row| row.samples, plain)
@@ -228,7 +228,7 @@ impl OcclusionChart {
         self.intervals.iter().chain(&self.samples).chain(&self.failing)
     }
 
-    fn rates(&self, kind: Kind) -> ChartPanel {
+    fn rates(&self, kind: OcclusionBlur) -> ChartPanel {
         let of_tile = |&tile: &u32| {
             let rows = self.intervals.iter().filter(|row| row.kind == kind && row.tile_px == Some(tile));
             let mut points: Vec<_> = rows.map(|row| (row.bytes, row.rate())).collect();
@@ -292,7 +292,7 @@ const LENS: f32 = 0.15;
 /// The part of a wall of slats that is gaps.
 const GAPS: f32 = 0.02;
 
-impl Kind {
+impl OcclusionBlur {
     /// A scene of this kind with so many boxes, its walls whole.
     pub(crate) fn spec(self, boxes: u32, seed: u64) -> WallSceneSpec {
         let motion = if self == Self::Defocus { 0.0 } else { MOTION };
@@ -336,7 +336,7 @@ pub(crate) struct Drawn {
     pub ran: Ran,
 }
 
-/// Answers of interval queries, and the farthest depths that they were asked against.
+/// Answers of interval queries, and the farthest depths that they were compared with.
 pub(crate) struct QueryAnswers {
     /// By box.
     pub answers: Vec<IntervalAnswer>,
@@ -366,10 +366,10 @@ impl Drawn {
         let occluders = RasterPass::new(&scene.camera, &walls, &settings);
         let mut alone = Gpu::without_packets(&gpu.pipeline)?;
         let depths = depths_of(&alone.draw(&occluders.onto(Target::Depth).with_visible())?.visible);
-        let ask = |any: bool| SampledQueries { occluders, any }.ask(&scene.boxes);
-        let (seen, counted) = (ask(true)?, ask(false)?);
+        let query = |any: bool| SampledQueries { occluders, any }.query(&scene.boxes);
+        let (seen, counted) = (query(true)?, query(false)?);
         let ran = [&alone.finish(), &seen.report, &counted.report].map(Ran::of).into_iter().sum();
-        let [seen, counted] = [seen, counted].map(|asked| asked.answers);
+        let [seen, counted] = [seen, counted].map(|queried| queried.answers);
         Ok(Self { scene, viewport, table, spec: gpu.pipeline, depths, seen, counted, ran })
     }
 
@@ -377,7 +377,7 @@ impl Drawn {
     ///
     /// # Errors
     /// When the caches of the GPU cannot be built.
-    pub fn ask(&self, boxes: [u32; 3], tile_px: u32) -> Result<QueryAnswers, StudyError> {
+    pub fn query(&self, boxes: [u32; 3], tile_px: u32) -> Result<QueryAnswers, StudyError> {
         let grid = BoxGrid::new(boxes, self.scene.camera.lens().is_some()).unwrap_or_default();
         let pyramid = Pyramid::new(self.viewport, &self.table, &self.depths, tile_px, grid);
         let projection = Projection::new(&self.scene.camera, self.viewport);
@@ -420,7 +420,7 @@ fn row(like: OcclusionRow, answers: &[(Answered, bool)]) -> OcclusionRow {
     }
 }
 
-fn blank(kind: Kind, slats: u32, samples: u32) -> OcclusionRow {
+fn blank(kind: OcclusionBlur, slats: u32, samples: u32) -> OcclusionRow {
     OcclusionRow {
         kind,
         slats,
@@ -446,9 +446,9 @@ fn by_intervals(
 ) -> Result<OcclusionRow, StudyError> {
     let (mut answered, mut half_covered) = (Vec::new(), 0.0);
     for drawn in scenes {
-        let asked = drawn.ask(boxes, tile_px)?;
-        half_covered += asked.half_covered / scenes.len() as f64;
-        let all = asked.answers.iter().zip(&drawn.seen).map(|(answer, seen)| {
+        let queried = drawn.query(boxes, tile_px)?;
+        half_covered += queried.half_covered / scenes.len() as f64;
+        let all = queried.answers.iter().zip(&drawn.seen).map(|(answer, seen)| {
             ((answer.hidden, [answer.tests(), answer.bytes(), answer.all_madds()]), seen.passed == 0)
         });
         answered.extend(all);
@@ -468,7 +468,7 @@ fn measure(effort: OcclusionEffort, progress: &Progress) -> Result<OcclusionChar
     let bar = progress.bar("occlusion", (3 * effort.samples.len() + effort.slats.len()) as u64);
     let mut chart =
         OcclusionChart { effort, intervals: Vec::new(), samples: Vec::new(), failing: Vec::new() };
-    for kind in Kind::ALL {
+    for kind in OcclusionBlur::ALL {
         for &samples in effort.samples {
             let scenes = drawn(&effort, kind, 1, samples, &bar)?;
             let like = blank(kind, 1, samples);
@@ -486,8 +486,8 @@ fn measure(effort: OcclusionEffort, progress: &Progress) -> Result<OcclusionChar
         }
     }
     for &slats in effort.slats {
-        let scenes = drawn(&effort, Kind::Motion, slats, SAMPLES, &bar)?;
-        let like = blank(Kind::Motion, slats, SAMPLES);
+        let scenes = drawn(&effort, OcclusionBlur::Motion, slats, SAMPLES, &bar)?;
+        let like = blank(OcclusionBlur::Motion, slats, SAMPLES);
         chart.failing.push(by_samples(&scenes, like));
         for tile_px in FAILING_TILES {
             chart.failing.push(by_intervals(&scenes, like, [1, 1, 8], tile_px)?);
@@ -498,7 +498,7 @@ fn measure(effort: OcclusionEffort, progress: &Progress) -> Result<OcclusionChar
 
 fn drawn(
     effort: &OcclusionEffort,
-    kind: Kind,
+    kind: OcclusionBlur,
     slats: u32,
     samples: u32,
     bar: &Bar,

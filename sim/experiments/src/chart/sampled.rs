@@ -6,17 +6,17 @@ use std::path::Path;
 
 use cpu_time::ProcessTime;
 use output::OutputError;
-use output::plot::{AxisSpec, ChartPanel, Mark, Paint, Series};
+use output::plot::{AxisSpec, ChartPanel, Paint, PlotMark, Series};
 use output::terminal::Progress;
 use run::{
-    Distinct, Forecast, Plan, Previews, Quantity, RunError, RunFrame, RunOptions, Sampling, Signatures,
+    Distinct, Forecast, Plan, Previews, RunError, RunFrame, RunOptions, RunQuantity, Sampling, Signatures,
     frames_of,
 };
 use serde::Serialize;
 use workloads::Overrides;
 
 use super::quantiles;
-use crate::study::table::{Sheet, Table, fixed, percent, plain};
+use crate::study::table::{Sheet, TableBuilder, fixed, percent, plain};
 use crate::study::tradeoff::{Metric, TradeoffPoint};
 use crate::study::{Gallery, Study, StudyError};
 
@@ -66,12 +66,12 @@ pub struct Trial {
 
 /// Cost of an animation.
 #[derive(Clone, Debug, Serialize)]
-pub struct Cost {
+pub struct AnimationCost {
     /// The animation.
     pub scene: String,
-    /// Its frames.
+    /// Frames of the scene.
     pub frames: usize,
-    /// Those that were simulated.
+    /// Frames that were simulated.
     pub simulated: usize,
     /// Frames for one that was simulated.
     pub times_fewer: f64,
@@ -87,7 +87,7 @@ pub struct Cost {
 
 /// A quantity over all trials.
 #[derive(Clone, Debug, Serialize)]
-pub struct Figures {
+pub struct TrialFigures {
     /// The quantity, or `all`.
     pub quantity: &'static str,
     /// Number of trials.
@@ -110,9 +110,9 @@ pub struct SampledChart {
     /// Effort.
     pub effort: SampledEffort,
     /// Over all animations, by quantity and together.
-    pub figures: Vec<Figures>,
+    pub figures: Vec<TrialFigures>,
     /// Cost of each animation.
-    pub costs: Vec<Cost>,
+    pub costs: Vec<AnimationCost>,
     /// Every trial.
     pub trials: Vec<Trial>,
 }
@@ -150,7 +150,7 @@ impl Study for SampledChart {
     }
 
     fn tables(&self) -> Vec<Sheet> {
-        let figures = Table::of(&self.figures)
+        let figures = TableBuilder::of(&self.figures)
             .shown("quantity", |f| f.quantity, plain)
             .shown("trials", |f| f.trials, plain)
             .shown("inside", |f| f.inside_percent, percent(1))
@@ -159,14 +159,14 @@ impl Study for SampledChart {
             .shown("worst", |f| f.error_worst_percent, percent(2))
             .shown("half-width: median", |f| f.half_width_median_percent, percent(2));
         let seconds = |s: f64| format!("{s:.2} s");
-        let costs = Table::of(&self.costs)
+        let costs = TableBuilder::of(&self.costs)
             .shown("animation", |cost| cost.scene.as_str(), plain)
             .shown("frames", |cost| cost.frames, plain)
             .shown("simulated", |cost| cost.simulated, plain)
             .shown("all", |cost| cost.all_s, seconds)
             .shown("sampled", |cost| cost.sampled_s, seconds)
             .shown("times less host time", |cost| cost.times_faster, fixed(1));
-        let trials = Table::of(&self.trials)
+        let trials = TableBuilder::of(&self.trials)
             .data("scene", |trial| trial.scene.as_str())
             .data("seed", |trial| trial.seed)
             .data("simulated", |trial| trial.simulated)
@@ -184,7 +184,7 @@ impl Study for SampledChart {
 
     /// The median error of each quantity, beside the host time of simulating all frames.
     fn tradeoff(&self) -> Vec<TradeoffPoint> {
-        let point = |cost: &Cost, quantity: &'static str| {
+        let point = |cost: &AnimationCost, quantity: &'static str| {
             let trials = self.trials.iter().filter(|t| t.scene == cost.scene && t.quantity == quantity);
             let error = quantiles(trials.map(|trial| trial.error_percent.abs()))(0.5);
             let relative = Metric::new(HOST_TIME, "", 1.0 / cost.times_faster);
@@ -206,11 +206,11 @@ fn median_error_of(quantity: &str) -> &'static str {
     }
 }
 
-fn figures(quantity: &'static str, trials: &[Trial]) -> Figures {
+fn figures(quantity: &'static str, trials: &[Trial]) -> TrialFigures {
     let of: Vec<&Trial> = trials.iter().filter(|t| quantity == "all" || t.quantity == quantity).collect();
     let sorted = |pick: fn(&Trial) -> f64| quantiles(of.iter().map(move |trial| pick(trial)));
     let errors = sorted(|trial| trial.error_percent.abs());
-    Figures {
+    TrialFigures {
         quantity,
         trials: of.len(),
         inside_percent: 100.0 * of.iter().filter(|trial| trial.inside).count() as f64
@@ -232,10 +232,10 @@ impl SampledChart {
         let ends = [widths().reduce(f64::min), widths().reduce(f64::max)];
         let equal = ends.into_iter().flatten().map(|width| (width, width)).collect();
         let mut series =
-            vec![Series::new("error as large as the half-width", Mark::Line(equal)).painted(Paint::Ink)];
+            vec![Series::new("error as large as the half-width", PlotMark::Line(equal)).painted(Paint::Ink)];
         for (number, trials) in trials.chunk_by(|a, b| a.scene == b.scene).enumerate() {
             let dot = |trial: &&Trial| (trial.half_width_percent, trial.error_percent.abs(), String::new());
-            let dots = Mark::Dots(trials.iter().map(dot).collect());
+            let dots = PlotMark::Dots(trials.iter().map(dot).collect());
             series.push(Series::new(&trials[0].scene, dots).painted(Paint::Like(number)));
         }
         let axes = [axis("half-width of the 95 % interval (%)"), axis("error (%)")];
@@ -248,7 +248,7 @@ fn animation(
     scene: &str,
     effort: SampledEffort,
     progress: &Progress,
-) -> Result<(Cost, Vec<Trial>), RunError> {
+) -> Result<(AnimationCost, Vec<Trial>), RunError> {
     let plan = plan(scene, effort)?;
     let numbers: Vec<u32> = plan.job.settings().frames.clone().collect();
     let started = ProcessTime::now();
@@ -279,7 +279,7 @@ fn animation(
         }));
     }
     let sampled_s = previews_s + all_s * simulated as f64 / numbers.len() as f64;
-    let cost = Cost {
+    let cost = AnimationCost {
         scene: name.into_owned(),
         frames: numbers.len(),
         simulated,
@@ -320,7 +320,7 @@ fn truth(frames: &[RunFrame], core_hz: f64) -> [f64; 3] {
     [cycles / count, energy_j / count, energy_j / cycles * core_hz]
 }
 
-fn trial(quantity: &'static str, truth: f64, found: Quantity) -> Trial {
+fn trial(quantity: &'static str, truth: f64, found: RunQuantity) -> Trial {
     Trial {
         scene: String::new(),
         seed: 0,

@@ -20,13 +20,13 @@ use run::GpuSpec;
 use serde::Serialize;
 use workloads::accumulation::{RayWork, SharedSamples};
 use workloads::soft_shadows::{
-    AreaLight, LightSpec, Method, SceneView, ShadowMap, Shadows, World, default_scene, depth_pass,
+    AreaLight, LightSpec, SceneView, ShadowMap, ShadowMethod, Shadows, World, default_scene, depth_pass,
 };
 use workloads::{Frame, Overrides, Scene};
 
 use crate::chart::glossy::Traced;
 use crate::chart::{errors, mean_square, neighbours};
-use crate::study::table::{Sheet, Table, count, fixed, plain};
+use crate::study::table::{Sheet, TableBuilder, count, fixed, plain};
 use crate::study::tradeoff::{Metric, TradeoffPoint};
 use crate::study::{Gallery, Study, StudyError};
 
@@ -113,7 +113,7 @@ impl Study for SoftShadowsChart {
     }
 
     fn tables(&self) -> Vec<Sheet> {
-        let rows = Table::of(&self.rows)
+        let rows = TableBuilder::of(&self.rows)
             .shown("places", |row| row.points, plain)
             .shown("RMSE", |row| row.rmse, fixed(5))
             .shown("neighbours", |row| row.neighbour_correlation, fixed(2))
@@ -125,7 +125,7 @@ impl Study for SoftShadowsChart {
             .shown("host s", |row| row.one_pass.host_s, fixed(3))
             .shown("(accumulated)", |row| row.accumulation.host_s, fixed(3))
             .shown("shading s", |row| row.shade_s, fixed(3));
-        let traced = Table::of(&self.rows)
+        let traced = TableBuilder::of(&self.rows)
             .column("points", "rays a pixel", |row| row.points, plain)
             .column("rmse", "RMSE", |row| row.traced.rmse, fixed(5))
             .column("neighbour_correlation", "neighbours", |row| row.traced_correlation, fixed(2))
@@ -133,11 +133,11 @@ impl Study for SoftShadowsChart {
             .column("triangles_per_ray", "triangles a ray", |row| row.traced.triangles_per_ray, fixed(1))
             .column("host_s", "host s", |row| row.traced.host_s, fixed(3))
             .csv("soft_shadows_rays.csv");
-        let biases = Table::of(&self.biases)
+        let biases = TableBuilder::of(&self.biases)
             .shown("bias, texels", |bias| bias.texels, plain)
             .shown("acne %", |bias| 100.0 * bias.acne, fixed(2))
             .shown("leak %", |bias| 100.0 * bias.leak, fixed(2));
-        let by_method = Table::of(self.rows.iter().flat_map(methods))
+        let by_method = TableBuilder::of(self.rows.iter().flat_map(methods))
             .data("points", |(row, ..)| row.points)
             .data("rmse", |(row, ..)| row.rmse)
             .data("neighbour_correlation", |(row, ..)| row.neighbour_correlation)
@@ -155,7 +155,7 @@ impl Study for SoftShadowsChart {
     }
 
     fn tradeoff(&self) -> Vec<TradeoffPoint> {
-        let point = |(row, method, cost): (&ShadowsRow, &str, &Cost)| {
+        let point = |(row, method, cost): (&ShadowsRow, &str, &MapCost)| {
             seconds(row, method, row.rmse, cost.host_s + row.shade_s)
         };
         let traced = |row: &ShadowsRow| seconds(row, "ray tracing", row.traced.rmse, row.traced.host_s);
@@ -168,7 +168,7 @@ impl Study for SoftShadowsChart {
 }
 
 /// Both ways to make a map, with what they cost.
-fn methods(row: &ShadowsRow) -> [(&ShadowsRow, &'static str, &Cost); 2] {
+fn methods(row: &ShadowsRow) -> [(&ShadowsRow, &'static str, &MapCost); 2] {
     [(row, "one pass", &row.one_pass), (row, "accumulation", &row.accumulation)]
 }
 
@@ -199,7 +199,7 @@ impl SoftShadowsChart {
 
     fn errors(&self) -> Vec<ChartPanel> {
         let name = "both methods: equal to the bit";
-        let over_cost = |method: fn(&ShadowsRow) -> &Cost, name: &str| {
+        let over_cost = |method: fn(&ShadowsRow) -> &MapCost, name: &str| {
             Series::curve(name, self.rows.iter().map(|row| (method(row).madds as f64, row.rmse)))
         };
         let rays = "ray tracing";
@@ -230,7 +230,7 @@ impl SoftShadowsChart {
     }
 
     fn costs(&self) -> Vec<ChartPanel> {
-        let both = |of: fn(&Cost) -> f64| {
+        let both = |of: fn(&MapCost) -> f64| {
             vec![
                 self.curve("one pass", |row| of(&row.one_pass)),
                 self.curve("accumulation", |row| of(&row.accumulation)),
@@ -260,7 +260,7 @@ impl SoftShadowsChart {
 
 /// Cost of a map.
 #[derive(Clone, Copy, Debug, Serialize)]
-pub struct Cost {
+pub struct MapCost {
     /// Passes over the geometry.
     pub passes: u32,
     /// Vertex shader runs.
@@ -289,9 +289,9 @@ pub struct ShadowsRow {
     /// Whether both maps are equal to the bit.
     pub equal: bool,
     /// In one pass.
-    pub one_pass: Cost,
+    pub one_pass: MapCost,
     /// In a pass each.
-    pub accumulation: Cost,
+    pub accumulation: MapCost,
     /// Seconds of the host for shading with a map.
     pub shade_s: f64,
     /// Ray tracing with as many samples of each pixel's own.
@@ -388,13 +388,13 @@ impl Bench<'_> {
         Ok((image, work, started.elapsed().as_secs_f64()))
     }
 
-    fn map(&self, set: &SharedSamples, method: Method) -> Result<(ShadowMap, Cost), StudyError> {
+    fn map(&self, set: &SharedSamples, method: ShadowMethod) -> Result<(ShadowMap, MapCost), StudyError> {
         let started = Instant::now();
         let mut gpu = Gpu::without_packets(self.spec())?;
         let Stage { light, effort, .. } = self.stage;
         let map = ShadowMap::new(light, self.draws, effort.map_px, set, method, &mut gpu)?;
         let host_s = started.elapsed().as_secs_f64();
-        let passes = if method == Method::OnePass { 1 } else { set.samples().len() as u32 };
+        let passes = if method == ShadowMethod::OnePass { 1 } else { set.samples().len() as u32 };
         let cost = cost(&gpu.finish().counts(), passes, host_s);
         Ok((map, cost))
     }
@@ -402,8 +402,8 @@ impl Bench<'_> {
     /// Both maps over a set of so many places, and the image of one of them.
     pub fn row(&self, points: u32, reference: &[Vec3]) -> Result<ShadowsRow, StudyError> {
         let set = SharedSamples::interleaved(&SampleSpec::default(), points, 1)?;
-        let (map, one_pass) = self.map(&set, Method::OnePass)?;
-        let (other, accumulation) = self.map(&set, Method::Accumulation)?;
+        let (map, one_pass) = self.map(&set, ShadowMethod::OnePass)?;
+        let (other, accumulation) = self.map(&set, ShadowMethod::Accumulation)?;
         let bits = |map: &ShadowMap| map.depths().iter().map(|depth| depth.to_bits()).collect::<Vec<_>>();
         let seen = self.seen(&set)?;
         let shadows = Shadows::Map { map: &map, bias: self.stage.effort.bias };
@@ -429,14 +429,14 @@ impl Bench<'_> {
 
     fn seen(&self, set: &SharedSamples) -> Result<Vec<(u32, u32)>, StudyError> {
         let view = SceneView { camera: &self.stage.frame.camera, draws: self.draws };
-        Ok(depth_pass(&view, self.viewport, set, Method::OnePass, &mut Gpu::images_only(self.spec())?)?
+        Ok(depth_pass(&view, self.viewport, set, ShadowMethod::OnePass, &mut Gpu::images_only(self.spec())?)?
             .samples)
     }
 
     /// Wrong shadows over the bias.
     pub fn biases(&self) -> Result<Vec<Bias>, StudyError> {
         let set = SharedSamples::interleaved(&SampleSpec::default(), BIAS_POINTS, 1)?;
-        let (map, seen) = (self.map(&set, Method::OnePass)?.0, self.seen(&set)?);
+        let (map, seen) = (self.map(&set, ShadowMethod::OnePass)?.0, self.seen(&set)?);
         let truth = self.world.lit_and_unlit(&set, &seen, Shadows::Rays);
         let target = glam::DVec3::from_array(LightSpec::default().target);
         let texel = self.stage.light.texel_width(target, map.side());
@@ -456,9 +456,9 @@ impl Bench<'_> {
     }
 }
 
-fn cost(counts: &Counts, passes: u32, host_s: f64) -> Cost {
+fn cost(counts: &Counts, passes: u32, host_s: f64) -> MapCost {
     let madds = [Event::SetupMadds, Event::TileMadds, Event::ScreenMadds, Event::SampleMadds];
-    Cost {
+    MapCost {
         passes,
         vertices: counts[Event::VertexInvocations],
         tiles: counts[Event::TilesVisited],

@@ -9,12 +9,12 @@ use workloads::Overrides;
 use workloads::stress::Size;
 
 use crate::stress::family_named;
-use crate::stress::measure::{Pairs, SWITCHES, Subject, Work, combinations, differing, on_subject};
-use crate::study::table::{Sheet, Table, fixed, plain, share};
+use crate::stress::measure::{MethodWork, Pairs, SWITCHES, Subject, combinations, differing, on_subject};
+use crate::study::table::{Sheet, TableBuilder, fixed, plain, share};
 use crate::study::tradeoff::{Metric, TradeoffPoint, front};
 use crate::study::{Gallery, Study, StudyError};
 use output::OutputError;
-use output::plot::{AxisSpec, ChartPanel, Mark, Paint, Scale, Series};
+use output::plot::{AxisSpec, ChartPanel, Paint, PlotMark, Scale, Series};
 use output::terminal::Progress;
 use run::{GpuSpec, RunError};
 
@@ -68,12 +68,12 @@ pub struct TileTestsEffort {
 
 /// The whole chart.
 #[derive(Clone, Debug, Serialize)]
-pub struct TileTests {
+pub struct TileTestsChart {
     /// A row for each scene and combination.
     pub rows: Vec<TileTestsRow>,
 }
 
-impl Study for TileTests {
+impl Study for TileTestsChart {
     const NAME: &'static str = "tile-tests";
     const ABOUT: &'static str =
         "Every combination of tile tests: efficiency and tightness over multiply-adds";
@@ -119,7 +119,7 @@ impl Study for TileTests {
 
     fn tables(&self) -> Vec<Sheet> {
         let best = |row: &&TileTestsRow| row.on_efficiency_front || row.on_tightness_front;
-        let fronts = Table::of(self.rows.iter().filter(best))
+        let fronts = TableBuilder::of(self.rows.iter().filter(best))
             .shown("scene", |row| row.scene.as_str(), plain)
             .shown("tests", |row| row.tests.as_str(), plain)
             .shown("madds per triangle", |row| row.madds_per_triangle, fixed(0))
@@ -127,7 +127,7 @@ impl Study for TileTests {
             .shown("tightness", |row| row.tightness, share(2))
             .shown("best in", |row| row.best_in(), plain)
             .after(format!("\n{}; {} samples lost\n", key(), self.samples_lost()));
-        let rows = Table::of(&self.rows)
+        let rows = TableBuilder::of(&self.rows)
             .data("scene", |row| row.scene.as_str())
             .data("tests", |row| row.tests.as_str())
             .data("madds_per_triangle", |row| row.madds_per_triangle)
@@ -195,7 +195,7 @@ fn rows(scene: &str, subject: &Subject<'_>, pairs: u64) -> Result<Vec<TileTestsR
     let pairs = Pairs::of(subject, pairs);
     let (reference, _) = subject.reference()?;
     let row = |(tests, features)| {
-        let work = Work::new(&subject.counts(features)?);
+        let work = MethodWork::new(&subject.counts(features)?);
         Ok(TileTestsRow {
             scene: scene.to_owned(),
             tests,
@@ -220,7 +220,7 @@ fn with_fronts(mut rows: Vec<TileTestsRow>) -> Vec<TileTestsRow> {
     rows
 }
 
-impl TileTests {
+impl TileTestsChart {
     /// Samples lost over all rows: must be none.
     pub fn samples_lost(&self) -> u64 {
         self.rows.iter().map(|row| row.samples_lost).sum()
@@ -238,10 +238,10 @@ impl TileTests {
         let mut steps: Vec<(f64, f64)> = best().map(|mean| (mean.cost, 100.0 * mean.gain)).collect();
         steps.sort_by(|a, b| a.0.total_cmp(&b.0));
         let series = vec![
-            Series::new("frontier", Mark::Steps(steps)).painted(Paint::Ink),
+            Series::new("frontier", PlotMark::Steps(steps)).painted(Paint::Ink),
             Series::new(
                 "a combination of tests",
-                Mark::Rings(
+                PlotMark::Rings(
                     others
                         .map(|m| point(m, if named(m) { words(&m.tests) } else { String::new() }))
                         .collect(),
@@ -250,7 +250,7 @@ impl TileTests {
             .painted(Paint::Like(0)),
             Series::new(
                 "on the frontier",
-                Mark::Dots(best().map(|mean| point(mean, words(&mean.tests))).collect()),
+                PlotMark::Dots(best().map(|mean| point(mean, words(&mean.tests))).collect()),
             )
             .painted(Paint::Like(1)),
         ];
@@ -324,16 +324,16 @@ mod tests {
     #[test]
     fn every_combination_is_compared_with_none_and_the_best_is_marked() {
         let gpu = GpuSpec::load("reference").unwrap();
-        let rows = of_family("speed", 0.1, &TileTests::QUICK, &gpu).unwrap();
+        let rows = of_family("speed", 0.1, &TileTestsChart::QUICK, &gpu).unwrap();
         assert_eq!(rows.len(), 1 << SWITCHES.len());
         assert!(rows.iter().all(|row| row.samples_lost == 0 && row.tightness <= 1.0 + 1e-9));
         let least = rows.iter().map(|row| row.madds_per_triangle).fold(f64::INFINITY, f64::min);
         let cheapest = rows.iter().find(|row| row.madds_per_triangle == least).unwrap();
         assert!(cheapest.on_efficiency_front && cheapest.tests != "-", "{cheapest:?}");
-        let chart = TileTests { rows };
+        let chart = TileTestsChart { rows };
         let out = tempfile::tempdir().unwrap();
         let make = |dir: &OutDir| Done::new(&chart, dir, &PlotStyle::default()).unwrap();
-        let done = OutDir::with(out.path(), TileTests::claim(), make).unwrap();
+        let done = OutDir::with(out.path(), TileTestsChart::claim(), make).unwrap();
         let csv = std::fs::read_to_string(out.path().join("tile_tests.csv")).unwrap();
         assert_eq!(csv.lines().count(), 1 + (1 << SWITCHES.len()));
         assert!(csv.starts_with("scene,tests,madds_per_triangle"));

@@ -25,8 +25,8 @@ use serde::Serialize;
 use settings::Form;
 
 pub use report::{Figure, PaperReport};
-pub use row::{Band, Case, Number, Row, Turn, Verdict};
-pub use settings::{About, Kind, Listed, Origin};
+pub use row::{Band, ClaimRow, RowNumber, TriedCase, Turn, Verdict};
+pub use settings::{About, Listed, RowKind, SettingsOrigin};
 
 /// Papers with reproduced claims.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -46,7 +46,7 @@ impl Paper {
     /// All papers.
     pub const ALL: [Self; 3] = [Self::Two, Self::Three, Self::Six];
 
-    /// Its number.
+    /// Number of the paper.
     pub const fn number(self) -> &'static str {
         match self {
             Self::Two => "II",
@@ -55,7 +55,7 @@ impl Paper {
         }
     }
 
-    /// Its title.
+    /// Title of the paper.
     pub const fn title(self) -> &'static str {
         match self {
             Self::Two => "Performance per What?",
@@ -78,7 +78,7 @@ impl Paper {
 
 /// Options of a reproduction.
 #[derive(Clone, Debug, Default)]
-pub struct Options {
+pub struct ReproduceOptions {
     /// Quick form: fewer values and less work, some minutes at most.
     pub quick: bool,
     /// Ids of the rows to compute; empty for all.
@@ -89,7 +89,7 @@ pub struct Options {
     pub collision_data: Option<PathBuf>,
 }
 
-impl Options {
+impl ReproduceOptions {
     fn form(&self) -> Form {
         if self.quick { Form::Quick } else { Form::Full }
     }
@@ -123,13 +123,13 @@ impl Options {
 
 /// A row with its figures.
 struct Done {
-    row: Row,
+    row: ClaimRow,
     figures: Vec<Figure>,
 }
 
 impl Done {
     /// A row without a figure.
-    fn bare(row: Row) -> Self {
+    fn bare(row: ClaimRow) -> Self {
         Self { row, figures: Vec::new() }
     }
 }
@@ -138,7 +138,11 @@ impl Done {
 ///
 /// # Errors
 /// If settings are invalid or a simulation fails. A row that differs is no error.
-pub fn compute(paper: Paper, options: &Options, progress: &Progress) -> Result<PaperReport, RunError> {
+pub fn compute(
+    paper: Paper,
+    options: &ReproduceOptions,
+    progress: &Progress,
+) -> Result<PaperReport, RunError> {
     options.check(paper)?;
     let (origin, done) = match paper {
         Paper::Two => paper2::rows(options, progress),
@@ -154,7 +158,7 @@ pub fn compute(paper: Paper, options: &Options, progress: &Progress) -> Result<P
 /// As [`compute`], and if `out` cannot be written, or has a larger result and `--force` is missing.
 pub fn reproduce(
     paper: Paper,
-    options: &Options,
+    options: &ReproduceOptions,
     out: &Destination,
     progress: &Progress,
 ) -> Result<PaperReport, RunError> {

@@ -11,12 +11,12 @@ use workloads::Overrides;
 use workloads::deferred::{Deferred, DeferredOptions, LightPass, NormalFormat};
 
 use super::report::{POWER, TIME, line};
-use super::row::{Cases, Number, Row, Verdict, With, numbers, one_at_a_time};
+use super::row::{Cases, ClaimRow, RowNumber, Verdict, With, numbers, one_at_a_time};
 use super::settings::{
-    About, Form, Origin, Setting, load, paper_settings, reduced, row_settings, settings_group,
+    About, Form, RowSetting, SettingsOrigin, load, paper_settings, reduced, row_settings, settings_group,
 };
 use super::stage::{Frames, MARKED, Stage, TracedRun, looped};
-use super::{Done, Figure, Options, Paper};
+use super::{Done, Figure, Paper, ReproduceOptions};
 
 /// The ids of its rows.
 pub(super) fn ids() -> Vec<&'static str> {
@@ -26,7 +26,10 @@ pub(super) fn ids() -> Vec<&'static str> {
 /// Pixels of the PC's image.
 const PIXELS: f64 = 1280.0 * 720.0;
 
-pub(super) fn rows(options: &Options, progress: &Progress) -> Result<(Origin, Vec<Done>), RunError> {
+pub(super) fn rows(
+    options: &ReproduceOptions,
+    progress: &Progress,
+) -> Result<(SettingsOrigin, Vec<Done>), RunError> {
     let (settings, origin) = load::<Settings>(options.settings.as_deref())?;
     let form = options.form();
     let (pc, less) = (Stage::pc()?, reduced(&settings.work, form));
@@ -48,7 +51,7 @@ pub(super) fn rows(options: &Options, progress: &Progress) -> Result<(Origin, Ve
 }
 
 /// Recorded frames.
-fn ran(recording: &TracedRun, found: usize) -> Vec<Number> {
+fn ran(recording: &TracedRun, found: usize) -> Vec<RowNumber> {
     numbers([
         ("frames_drawn", recording.truth.frames.len() as f64),
         ("samples_recorded", recording.trace.samples() as f64),
@@ -84,7 +87,7 @@ fn inverses(with: &With<'_, Inverses>, recording: &TracedRun, frames: &Frames) -
         ("whole_animation_pixels_per_J", whole),
     ]);
     let made = with.row(&with.settings.about, (ours, Verdict::of(holds), note));
-    Done::bare(Row { numbers: facts, ran: ran(recording, frames.found.len()), ..made })
+    Done::bare(ClaimRow { numbers: facts, ran: ran(recording, frames.found.len()), ..made })
 }
 
 paper_settings!(Paper::Two, "paper2.ron" {
@@ -281,7 +284,7 @@ impl Tried<'_> {
     fn along<T: Clone>(
         &mut self,
         setting: &'static str,
-        values: &Setting<T>,
+        values: &RowSetting<T>,
         name: fn(&T) -> String,
         change: Change<T>,
     ) -> Result<(), RunError> {
@@ -349,7 +352,7 @@ fn row(with: &With<'_, Passes>, bench: &Bench<'_>, progress: &Progress) -> Resul
         ("samples_recorded", base.recording.trace.samples() as f64),
     ]);
     let figure = figure(&base, bench.pc.platform.idle_w.value());
-    Ok(Done { row: Row { numbers: facts(&base.split, largest), ran, ..made }, figures: vec![figure] })
+    Ok(Done { row: ClaimRow { numbers: facts(&base.split, largest), ran, ..made }, figures: vec![figure] })
 }
 
 fn ours(split: &Split, row: &Passes, form: Form) -> String {
@@ -363,7 +366,7 @@ fn ours(split: &Split, row: &Passes, form: Form) -> String {
     )
 }
 
-fn facts(split: &Split, largest: f64) -> Vec<Number> {
+fn facts(split: &Split, largest: f64) -> Vec<RowNumber> {
     numbers([
         ("frame_nJ_per_pixel", 1e9 * split.frame),
         ("g_buffer_nJ_per_pixel", 1e9 * split.g_buffer),

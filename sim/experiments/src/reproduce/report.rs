@@ -3,31 +3,31 @@
 
 use std::fs;
 
-use output::plot::{AxisSpec, Chart, ChartPanel, Mark, Picture, PlotStyle, Scale, Series};
+use output::plot::{AxisSpec, Chart, ChartPanel, Picture, PlotMark, PlotStyle, Scale, Series};
 use output::table::Table;
 use output::{Claim, Destination, OutDir, OutputError};
 use run::RunError;
 use serde::{Deserialize, Serialize};
 
-use super::row::{Row, Verdict};
-use super::settings::{Form, Listed, Origin};
-use super::{Done, Options, Paper};
+use super::row::{ClaimRow, Verdict};
+use super::settings::{Form, Listed, SettingsOrigin};
+use super::{Done, Paper, ReproduceOptions};
 
 /// The rows of a paper.
 #[derive(Serialize)]
 pub struct PaperReport {
     /// Which paper.
     pub paper: Paper,
-    /// Its title.
+    /// Title of the paper.
     pub title: &'static str,
     /// How much was computed.
     pub form: Form,
     /// The file of settings.
-    pub settings: Origin,
+    pub settings: SettingsOrigin,
     /// Whether every row of kind E holds.
     pub equalities_hold: bool,
     /// The rows in order.
-    pub rows: Vec<Row>,
+    pub rows: Vec<ClaimRow>,
     /// Figures.
     #[serde(skip)]
     figures: Vec<Figure>,
@@ -46,7 +46,7 @@ pub(super) fn stem(paper: Paper) -> String {
 }
 
 impl PaperReport {
-    pub(super) fn new(paper: Paper, form: Form, settings: Origin, done: Vec<Done>) -> Self {
+    pub(super) fn new(paper: Paper, form: Form, settings: SettingsOrigin, done: Vec<Done>) -> Self {
         let (mut rows, mut figures) = (Vec::new(), Vec::new());
         for Done { mut row, figures: drawn } in done {
             row.figures = drawn.iter().map(Figure::path).collect();
@@ -54,7 +54,7 @@ impl PaperReport {
             rows.push(row.judged());
             figures.extend(drawn);
         }
-        let equalities_hold = !rows.iter().any(Row::is_unequal);
+        let equalities_hold = !rows.iter().any(ClaimRow::is_unequal);
         Self { paper, title: paper.title(), form, settings, equalities_hold, rows, figures }
     }
 
@@ -143,7 +143,7 @@ impl PaperReport {
 }
 
 /// Text of a row.
-fn described(row: &Row) -> String {
+fn described(row: &ClaimRow) -> String {
     let about = &row.about;
     let mut text = format!("\n{}: {}\n", about.id, row.verdict_text);
     let mut line = |name: &str, what: &str| {
@@ -167,7 +167,7 @@ fn described(row: &Row) -> String {
 }
 
 /// Amount of work of a row.
-fn ran(row: &Row) -> String {
+fn ran(row: &ClaimRow) -> String {
     let each = row.ran.iter().map(|number| format!("{} {}", number.name.replace('_', " "), number.value));
     each.collect::<Vec<_>>().join(", ")
 }
@@ -183,7 +183,7 @@ fn settings(all: &[Listed], basis: &str) -> String {
 }
 
 /// Letter of the row's kind, with an F if it has figures.
-fn letters(row: &Row) -> String {
+fn letters(row: &ClaimRow) -> String {
     let drawn = if row.figures.is_empty() { "" } else { ",F" };
     format!("{}{drawn}", row.about.kind.letter())
 }
@@ -207,7 +207,11 @@ struct Id {
 
 /// Refuses a folder whose result of `paper` has rows that are not computed now, or is of the full form if
 /// this is the quick form. A file that cannot be read is no result.
-pub(super) fn check_earlier(paper: Paper, options: &Options, out: &Destination) -> Result<(), RunError> {
+pub(super) fn check_earlier(
+    paper: Paper,
+    options: &ReproduceOptions,
+    out: &Destination,
+) -> Result<(), RunError> {
     let file = out.folder.join(format!("{}.json", stem(paper)));
     let text = if out.force { None } else { fs::read_to_string(file).ok() };
     let Some(Earlier { form, rows }) = text.and_then(|text| serde_json::from_str(&text).ok()) else {
@@ -235,7 +239,7 @@ pub(super) fn check_earlier(paper: Paper, options: &Options, out: &Destination) 
 
 /// A picture and its name.
 pub struct Figure {
-    /// Its name without ending, for example `III_fig3`.
+    /// Name of the figure without ending, for example `III_fig3`.
     pub name: &'static str,
     /// Picture.
     pub picture: Picture,
@@ -291,13 +295,13 @@ pub(super) const ENERGY: (&str, &str) = ("energy per frame", "J");
 
 /// A line.
 pub(super) fn line(name: &str, points: Vec<(f64, f64)>) -> Series {
-    Series::new(name, Mark::Line(points))
+    Series::new(name, PlotMark::Line(points))
 }
 
 /// Dots without names.
 pub(super) fn dots(name: &str, points: Vec<(f64, f64)>) -> Series {
     let dots = points.into_iter().map(|(x, y)| (x, y, String::new())).collect();
-    Series::new(name, Mark::Dots(dots))
+    Series::new(name, PlotMark::Dots(dots))
 }
 
 /// A horizontal line.
@@ -313,19 +317,21 @@ pub(super) fn by_place(values: &[f64]) -> Vec<(f64, f64)> {
 #[cfg(test)]
 mod tests {
     use super::super::row::tests::row;
-    use super::super::settings::Kind;
+    use super::super::settings::RowKind;
     use super::*;
 
-    fn done(id: &'static str, kind: Kind, verdict: Verdict) -> Done {
+    fn done(id: &'static str, kind: RowKind, verdict: Verdict) -> Done {
         let axes = [("x", ""), ("y", "W")];
         let figure = Figure::lines("III_fig1", "t", "s", axes, Vec::new());
-        let figures = if kind == Kind::Order { vec![figure] } else { Vec::new() };
+        let figures = if kind == RowKind::Order { vec![figure] } else { Vec::new() };
         Done { row: row(id, kind, verdict), figures }
     }
 
     fn report(verdict: Verdict) -> PaperReport {
-        let rows = vec![done("III-8", Kind::Equality, verdict), done("III-9", Kind::Order, Verdict::Differs)];
-        let origin = Origin { file: "paper.ron".to_owned(), sha256: "abc".to_owned(), committed: false };
+        let rows =
+            vec![done("III-8", RowKind::Equality, verdict), done("III-9", RowKind::Order, Verdict::Differs)];
+        let origin =
+            SettingsOrigin { file: "paper.ron".to_owned(), sha256: "abc".to_owned(), committed: false };
         PaperReport::new(Paper::Three, Form::Quick, origin, rows)
     }
 
@@ -369,13 +375,14 @@ mod tests {
     fn a_larger_result_is_not_replaced_by_a_smaller_one() {
         let folder = tempfile::tempdir().unwrap();
         let out = Destination::new(folder.path());
-        let options = |quick, rows: &[&str]| Options {
+        let options = |quick, rows: &[&str]| ReproduceOptions {
             quick,
             rows: rows.iter().map(|row| (*row).to_owned()).collect(),
-            ..Options::default()
+            ..ReproduceOptions::default()
         };
-        let refusal =
-            |options: &Options| check_earlier(Paper::Six, options, &out).err().map(|error| error.to_string());
+        let refusal = |options: &ReproduceOptions| {
+            check_earlier(Paper::Six, options, &out).err().map(|error| error.to_string())
+        };
         assert_eq!(refusal(&options(true, &["VI-2"])), None, "an empty folder");
         let file = folder.path().join("reproduce_VI.json");
         fs::write(&file, r#"{"form": "full", "rows": [{"id": "VI-1"}, {"id": "VI-2"}]}"#).unwrap();
@@ -393,6 +400,6 @@ mod tests {
         assert!(check_earlier(Paper::Six, &options(true, &["VI-2"]), &forced).is_ok());
         assert!(check_earlier(Paper::Two, &options(true, &[]), &out).is_ok(), "a result of another paper");
         fs::write(&file, "mine").unwrap();
-        assert_eq!(refusal(&options(true, &["VI-2"])), None, "no result; whose it is is asked elsewhere");
+        assert_eq!(refusal(&options(true, &["VI-2"])), None, "no result; whose it is is checked elsewhere");
     }
 }

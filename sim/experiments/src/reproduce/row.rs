@@ -4,12 +4,12 @@
 use run::RunError;
 use serde::Serialize;
 
-use super::settings::{About, Form, Kind, Listed, listed, reduced};
+use super::settings::{About, Form, Listed, RowKind, listed, reduced};
 use crate::study::Ran;
 
 /// A row of the list of claims.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Row {
+pub struct ClaimRow {
     /// The claim, and the condition of the verdict.
     #[serde(flatten)]
     pub about: About,
@@ -28,9 +28,9 @@ pub struct Row {
     /// Why it differs, where the condition changes, or which part is missing.
     pub note: String,
     /// Amount of work: draws, passes, fragments, samples. A row with a 0 shows nothing.
-    pub ran: Vec<Number>,
+    pub ran: Vec<RowNumber>,
     /// The numbers behind `ours`, by name.
-    pub numbers: Vec<Number>,
+    pub numbers: Vec<RowNumber>,
     /// Settings of the row.
     pub settings: Vec<Listed>,
     /// SHA-256 of the file of these settings.
@@ -43,14 +43,14 @@ pub struct Row {
 
 /// A computed number.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Number {
-    /// Its name, with its unit.
+pub struct RowNumber {
+    /// Name of the number, with its unit.
     pub name: &'static str,
-    /// Its value.
+    /// Value of the number.
     pub value: f64,
 }
 
-impl Number {
+impl RowNumber {
     /// Whether the count is 0.
     fn is_nothing(&self) -> bool {
         self.value.is_nan() || self.value <= 0.0
@@ -58,12 +58,12 @@ impl Number {
 }
 
 /// Numbers from names and values.
-pub(super) fn numbers<const N: usize>(pairs: [(&'static str, f64); N]) -> Vec<Number> {
-    pairs.into_iter().map(|(name, value)| Number { name, value }).collect()
+pub(super) fn numbers<const N: usize>(pairs: [(&'static str, f64); N]) -> Vec<RowNumber> {
+    pairs.into_iter().map(|(name, value)| RowNumber { name, value }).collect()
 }
 
 /// Passes, draws and fragments that ran.
-pub(super) fn ran(of: &Ran) -> Vec<Number> {
+pub(super) fn ran(of: &Ran) -> Vec<RowNumber> {
     let Ran { passes, draws, fragments } = *of;
     numbers([("passes", passes as f64), ("draws", draws as f64), ("fragments", fragments as f64)])
 }
@@ -80,9 +80,9 @@ pub(super) struct With<'a, S> {
 
 impl<S: Serialize> With<'_, S> {
     /// The row with its result: `ours`, the verdict and a note.
-    pub fn row(&self, about: &About, (ours, verdict, note): (String, Verdict, String)) -> Row {
+    pub fn row(&self, about: &About, (ours, verdict, note): (String, Verdict, String)) -> ClaimRow {
         let own = reduced(self.settings, self.form);
-        Row {
+        ClaimRow {
             about: about.clone(),
             ours,
             verdict,
@@ -101,21 +101,21 @@ impl<S: Serialize> With<'_, S> {
     }
 
     /// The same with the verdict of the band over all settings tried.
-    pub fn banded(&self, about: &About, ours: String, band: Band) -> Row {
+    pub fn banded(&self, about: &About, ours: String, band: Band) -> ClaimRow {
         let row = self.row(about, (ours, band.verdict(), band.text()));
-        Row { band: Some(band), ..row }
+        ClaimRow { band: Some(band), ..row }
     }
 }
 
-impl Row {
+impl ClaimRow {
     /// Whether a required amount of work is 0.
     pub fn ran_nothing(&self) -> bool {
-        self.ran.is_empty() || self.ran.iter().any(Number::is_nothing)
+        self.ran.is_empty() || self.ran.iter().any(RowNumber::is_nothing)
     }
 
     /// Whether the row is an equality that does not hold.
     pub fn is_unequal(&self) -> bool {
-        self.about.kind == Kind::Equality && self.verdict != Verdict::Holds
+        self.about.kind == RowKind::Equality && self.verdict != Verdict::Holds
     }
 
     /// Whether the row must hold and does not, or did no work.
@@ -164,10 +164,10 @@ impl Row {
 
 /// Result of one combination of settings.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Case {
+pub struct TriedCase {
     /// The varied setting; empty if all have their given values.
     pub setting: String,
-    /// Its value.
+    /// Value of the varied setting.
     pub value: String,
     /// The number in the condition.
     pub number: f64,
@@ -206,7 +206,7 @@ pub struct Band {
     /// Where the condition changes.
     pub turns: Vec<Turn>,
     /// Every case.
-    pub cases: Vec<Case>,
+    pub cases: Vec<TriedCase>,
 }
 
 /// Cases as they are computed.
@@ -214,7 +214,7 @@ pub struct Band {
 pub(super) struct Cases {
     of: &'static str,
     varied: &'static str,
-    cases: Vec<Case>,
+    cases: Vec<TriedCase>,
     turns: Vec<Turn>,
 }
 
@@ -232,7 +232,7 @@ impl Cases {
         values: impl IntoIterator<Item = (V, f64, bool)>,
     ) -> &mut Self {
         let first = self.cases.len();
-        self.cases.extend(values.into_iter().map(|(value, number, holds)| Case {
+        self.cases.extend(values.into_iter().map(|(value, number, holds)| TriedCase {
             setting: setting.to_owned(),
             value: value.to_string(),
             number,
@@ -265,8 +265,8 @@ impl Cases {
         let nothing = || RunError::setting(format!("{}: the settings have no value to try", self.of));
         let (min, max) = least_and_most.ok_or_else(nothing)?;
         let mut counted = false;
-        let mut first = |case: &&Case| !case.base || !std::mem::replace(&mut counted, true);
-        let different: Vec<&Case> = self.cases.iter().filter(&mut first).collect();
+        let mut first = |case: &&TriedCase| !case.base || !std::mem::replace(&mut counted, true);
+        let different: Vec<&TriedCase> = self.cases.iter().filter(&mut first).collect();
         let (tried, held) = (different.len(), different.iter().filter(|case| case.holds).count());
         let Self { of, varied, cases, turns } = self;
         Ok(Band { of, varied, min, max, tried, full, held, turns, cases })
@@ -358,7 +358,7 @@ impl Verdict {
 pub(super) mod tests {
     use super::*;
 
-    pub fn row(id: &str, kind: Kind, verdict: Verdict) -> Row {
+    pub fn row(id: &str, kind: RowKind, verdict: Verdict) -> ClaimRow {
         let about = About {
             id: id.to_owned(),
             kind,
@@ -369,18 +369,20 @@ pub(super) mod tests {
         };
         let with = With { settings: &(), form: Form::Full, sha256: "abc", shared_less: Vec::new() };
         let row = with.row(&about, ("two".to_owned(), verdict, "because".to_owned()));
-        Row { ran: numbers([("draws", 3.0)]), numbers: numbers([("n", 2.0)]), ..row }
+        ClaimRow { ran: numbers([("draws", 3.0)]), numbers: numbers([("n", 2.0)]), ..row }
     }
 
     #[test]
     fn an_equality_that_does_not_hold_fails() {
         for verdict in [Verdict::Differs, Verdict::Depends, Verdict::NotYet] {
-            assert!(row("X-1", Kind::Equality, verdict).fails());
-            assert!(!row("X-1", Kind::Number, verdict).fails() && !row("X-1", Kind::Order, verdict).fails());
+            assert!(row("X-1", RowKind::Equality, verdict).fails());
+            assert!(
+                !row("X-1", RowKind::Number, verdict).fails() && !row("X-1", RowKind::Order, verdict).fails()
+            );
         }
-        assert!(!row("X-1", Kind::Equality, Verdict::Holds).fails());
+        assert!(!row("X-1", RowKind::Equality, Verdict::Holds).fails());
         assert_eq!(
-            serde_json::to_value(row("X-1", Kind::Order, Verdict::NotYet)).unwrap()["verdict"],
+            serde_json::to_value(row("X-1", RowKind::Order, Verdict::NotYet)).unwrap()["verdict"],
             "not yet"
         );
     }
@@ -389,36 +391,36 @@ pub(super) mod tests {
     fn a_row_that_ran_nothing_fails_and_shows_nothing() {
         for ran in [Vec::new(), numbers([("draws", 3.0), ("fragments", 0.0)]), numbers([("draws", f64::NAN)])]
         {
-            let empty = Row { ran, ..row("X-1", Kind::Order, Verdict::Holds) };
+            let empty = ClaimRow { ran, ..row("X-1", RowKind::Order, Verdict::Holds) };
             assert!(empty.fails());
             let judged = empty.judged();
             assert_eq!(judged.verdict, Verdict::Differs);
             assert!(judged.note.starts_with("nothing was run"), "{}", judged.note);
         }
-        let good = row("X-1", Kind::Order, Verdict::Holds);
-        assert_eq!(good.clone().judged(), Row { verdict_text: "holds".to_owned(), ..good });
+        let good = row("X-1", RowKind::Order, Verdict::Holds);
+        assert_eq!(good.clone().judged(), ClaimRow { verdict_text: "holds".to_owned(), ..good });
     }
 
     /// The quick form may omit the values at which a condition changes.
     #[test]
     fn a_quick_verdict_says_at_how_many_settings_it_was_reached() {
-        let quick = Row { form: Form::Quick, ..row("X-1", Kind::Order, Verdict::Holds) };
+        let quick = ClaimRow { form: Form::Quick, ..row("X-1", RowKind::Order, Verdict::Holds) };
         assert_eq!(quick.clone().judged().verdict_text, "holds (quick form)");
         let mut cases = Cases::new("share", "tiles alone");
         cases.along("tiles", [(4, 0.5, true), (8, 0.2, true)]);
         let less_work = vec!["yards".to_owned()];
-        let banded = Row { band: cases.band(6).ok(), less_work, ..quick };
+        let banded = ClaimRow { band: cases.band(6).ok(), less_work, ..quick };
         let text = "holds at 2 of 6 settings (quick form, less work)";
         assert_eq!(banded.clone().judged().verdict_text, text);
-        assert_eq!(Row { form: Form::Full, ..banded.clone() }.judged().verdict_text, "holds");
-        assert_eq!(Row { verdict: Verdict::NotYet, ..banded }.judged().verdict_text, "not yet");
+        assert_eq!(ClaimRow { form: Form::Full, ..banded.clone() }.judged().verdict_text, "holds");
+        assert_eq!(ClaimRow { verdict: Verdict::NotYet, ..banded }.judged().verdict_text, "not yet");
     }
 
     #[test]
     fn numbers_that_were_not_measured_are_left_out() {
-        let some = Row {
+        let some = ClaimRow {
             numbers: numbers([("n", 2.0), ("at_64", f64::NAN)]),
-            ..row("X-1", Kind::Order, Verdict::Holds)
+            ..row("X-1", RowKind::Order, Verdict::Holds)
         };
         assert_eq!(some.judged().numbers, numbers([("n", 2.0)]));
     }

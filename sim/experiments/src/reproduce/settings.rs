@@ -40,10 +40,10 @@ impl Form {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct About {
-    /// Its name in the list of claims.
+    /// Name of the row in the list of claims.
     pub id: String,
     /// Kind of agreement.
-    pub kind: Kind,
+    pub kind: RowKind,
     /// The claim, in full.
     pub claim: String,
     /// Statement of the paper, with the passage.
@@ -56,7 +56,7 @@ pub struct About {
 
 /// Kind of agreement that a row needs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
-pub enum Kind {
+pub enum RowKind {
     /// An equality that holds exactly.
     Equality,
     /// A number with a tolerance.
@@ -65,7 +65,7 @@ pub enum Kind {
     Order,
 }
 
-impl Kind {
+impl RowKind {
     /// The letter of the list of claims.
     pub const fn letter(self) -> &'static str {
         match self {
@@ -76,7 +76,7 @@ impl Kind {
     }
 }
 
-impl Serialize for Kind {
+impl Serialize for RowKind {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         serializer.serialize_str(self.letter())
     }
@@ -85,7 +85,7 @@ impl Serialize for Kind {
 /// A setting of a row with its source.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub enum Setting<T> {
+pub enum RowSetting<T> {
     /// The thesis states it.
     Stated {
         /// Stated value.
@@ -124,7 +124,7 @@ fn none<T>() -> Option<T> {
     None
 }
 
-impl<T> Setting<T> {
+impl<T> RowSetting<T> {
     /// Value while other settings vary.
     pub fn get(&self, form: Form) -> &T {
         match self {
@@ -162,7 +162,7 @@ impl<T> Setting<T> {
     }
 }
 
-impl<T: Debug + PartialEq> Setting<T> {
+impl<T: Debug + PartialEq> RowSetting<T> {
     /// Checks all values of the setting called `name`, and that it has a source.
     ///
     /// # Errors
@@ -221,7 +221,7 @@ macro_rules! settings_group {
         #[serde(deny_unknown_fields)]
         pub(super) struct $group {
             $($unchecked)*
-            $(pub $field: Setting<$type>,)+
+            $(pub $field: RowSetting<$type>,)+
         }
 
         impl $group {
@@ -283,7 +283,7 @@ pub trait PaperSettings: DeserializeOwned {
     const PAPER: Paper;
     /// The committed file, from the root of the repository.
     const FILE: &str;
-    /// Its text.
+    /// Text of the committed file.
     const TEXT: &str;
 
     /// The number of the paper that the file names.
@@ -298,7 +298,7 @@ pub trait PaperSettings: DeserializeOwned {
 
 /// Settings file of a result.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
-pub struct Origin {
+pub struct SettingsOrigin {
     /// Name of the file, as given.
     pub file: String,
     /// SHA-256 of its bytes, as `sha256sum` prints it.
@@ -311,7 +311,7 @@ pub struct Origin {
 ///
 /// # Errors
 /// If the file cannot be read or a value is invalid, with its place.
-pub fn load<T: PaperSettings>(file: Option<&Path>) -> Result<(T, Origin), RunError> {
+pub fn load<T: PaperSettings>(file: Option<&Path>) -> Result<(T, SettingsOrigin), RunError> {
     let Some(path) = file else { return parse(T::TEXT, T::FILE) };
     let name = path.display().to_string();
     let text =
@@ -319,7 +319,7 @@ pub fn load<T: PaperSettings>(file: Option<&Path>) -> Result<(T, Origin), RunErr
     parse(&text, &name)
 }
 
-fn parse<T: PaperSettings>(text: &str, name: &str) -> Result<(T, Origin), RunError> {
+fn parse<T: PaperSettings>(text: &str, name: &str) -> Result<(T, SettingsOrigin), RunError> {
     let settings: T = spec::parse(text, name)?;
     let (paper, number) = (settings.paper(), T::PAPER.number());
     if paper != number {
@@ -327,13 +327,16 @@ fn parse<T: PaperSettings>(text: &str, name: &str) -> Result<(T, Origin), RunErr
         return Err(RunError::invalid(name, why));
     }
     settings.check().map_err(|message| RunError::invalid(name, message))?;
-    Ok((settings, Origin { file: name.to_owned(), sha256: sha256_of_text(text), committed: text == T::TEXT }))
+    Ok((
+        settings,
+        SettingsOrigin { file: name.to_owned(), sha256: sha256_of_text(text), committed: text == T::TEXT },
+    ))
 }
 
 /// A setting as a report lists it.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Listed {
-    /// Its name in the file.
+    /// Name of the setting in the file.
     pub name: String,
     /// `stated`, `open` or `ours`.
     pub basis: &'static str,
@@ -355,21 +358,21 @@ pub fn listed(row: &impl Serialize, form: Form) -> Vec<Listed> {
 pub fn reduced(row: &impl Serialize, form: Form) -> Vec<String> {
     let Ok(serde_json::Value::Object(fields)) = serde_json::to_value(row) else { return Vec::new() };
     let less = |(name, value)| {
-        let setting: Setting<serde_json::Value> = serde_json::from_value(value).ok()?;
-        let open = matches!(setting, Setting::Open { .. });
+        let setting: RowSetting<serde_json::Value> = serde_json::from_value(value).ok()?;
+        let open = matches!(setting, RowSetting::Open { .. });
         (!open && setting.get(form) != setting.get(Form::Full)).then_some(name)
     };
     fields.into_iter().filter_map(less).collect()
 }
 
 fn one(name: String, value: serde_json::Value, form: Form) -> Option<Listed> {
-    let setting: Setting<serde_json::Value> = serde_json::from_value(value).ok()?;
+    let setting: RowSetting<serde_json::Value> = serde_json::from_value(value).ok()?;
     let (value, tried) = (setting.get(form).clone(), setting.all(form).to_vec());
     let tried = if tried.len() > 1 { tried } else { Vec::new() };
     let (basis, source) = match setting {
-        Setting::Stated { passage, .. } => ("stated", passage),
-        Setting::Open { why, .. } => ("open", why),
-        Setting::Ours { why, .. } => ("ours", why),
+        RowSetting::Stated { passage, .. } => ("stated", passage),
+        RowSetting::Open { why, .. } => ("open", why),
+        RowSetting::Ours { why, .. } => ("ours", why),
     };
     Some(Listed { name, basis, value, tried, source })
 }
@@ -378,8 +381,8 @@ fn one(name: String, value: serde_json::Value, form: Form) -> Option<Listed> {
 mod tests {
     use super::*;
 
-    fn open(value: u32, over: &[u32], quick: &[u32]) -> Setting<u32> {
-        Setting::Open { value, over: over.to_vec(), quick: quick.to_vec(), why: "because".to_owned() }
+    fn open(value: u32, over: &[u32], quick: &[u32]) -> RowSetting<u32> {
+        RowSetting::Open { value, over: over.to_vec(), quick: quick.to_vec(), why: "because".to_owned() }
     }
 
     #[test]
@@ -389,18 +392,18 @@ mod tests {
         assert_eq!((setting.get(Form::Quick), setting.all(Form::Quick)), (&3, &[3, 1][..]));
         let same = open(2, &[1, 2], &[]);
         assert_eq!((same.get(Form::Quick), same.all(Form::Quick)), (&2, &[1, 2][..]));
-        let ours = Setting::Ours { value: 9, quick: Some(4), why: String::new() };
+        let ours = RowSetting::Ours { value: 9, quick: Some(4), why: String::new() };
         assert_eq!((ours.get(Form::Full), ours.all(Form::Quick)), (&9, &[4][..]));
     }
 
     #[test]
     fn values_that_cannot_be_are_named_with_what_would_do() {
-        let message = |setting: Setting<u32>| setting.within("px", 1..=8).unwrap_err();
+        let message = |setting: RowSetting<u32>| setting.within("px", 1..=8).unwrap_err();
         assert_eq!(message(open(2, &[2, 9], &[])), "`px` is 9; it has to be 1 to 8");
         assert!(message(open(2, &[2, 3], &[0])).contains("`px` is 0"));
         assert!(message(open(2, &[3, 4], &[])).contains("2 among them"));
         assert!(message(open(2, &[2], &[])).contains("two values or more"));
-        let silent = Setting::Stated { value: 2, quick: None, passage: " ".to_owned() };
+        let silent = RowSetting::Stated { value: 2, quick: None, passage: " ".to_owned() };
         assert!(message(silent).contains("where it comes from"));
         assert!(open(2, &[1, 2], &[]).within("px", 1..=8).is_ok());
     }
@@ -410,18 +413,19 @@ mod tests {
         #[derive(Serialize)]
         struct Row {
             about: About,
-            px: Setting<u32>,
-            cells: Setting<(u32, u32)>,
+            px: RowSetting<u32>,
+            cells: RowSetting<(u32, u32)>,
         }
         let about = About {
             id: "X-1".to_owned(),
-            kind: Kind::Order,
+            kind: RowKind::Order,
             claim: String::new(),
             paper: String::new(),
             holds_when: String::new(),
             limits: String::new(),
         };
-        let cells = Setting::Stated { value: (2, 3), quick: Some((1, 1)), passage: "section 1".to_owned() };
+        let cells =
+            RowSetting::Stated { value: (2, 3), quick: Some((1, 1)), passage: "section 1".to_owned() };
         let row = Row { about, px: open(2, &[1, 2], &[1]), cells };
         assert!(reduced(&row, Form::Full).is_empty());
         assert_eq!(reduced(&row, Form::Quick), ["cells"], "px has fewer values, not less work");

@@ -17,7 +17,7 @@ use timing::{FrameClock, Level, Recorder};
 use traces::Trace;
 use traces::device::{Device, DeviceSpec};
 use traces::energy::{self, FrameEnergy, PowerIntegral, Score, TOLERANCE_S, TrueFrame};
-use traces::frames::{FinderMethod, Flag, Marks, Options, Window, default_window, find_with};
+use traces::frames::{FinderMethod, FinderOptions, Flag, Marks, Window, default_window, find_with};
 use workloads::scene::{
     Frustum, Graph, Local, Node, Parts, Rig, SceneCamera, Settings as SceneSettings, Trs,
 };
@@ -257,7 +257,11 @@ impl TracedRun {
 
     /// The same by another method.
     pub fn find_by(&self, method: FinderMethod, marked: usize) -> Result<Frames, RunError> {
-        let found = find_with(&self.trace, &self.marks(marked), &Options { method, ..Options::default() })?;
+        let found = find_with(
+            &self.trace,
+            &self.marks(marked),
+            &FinderOptions { method, ..FinderOptions::default() },
+        )?;
         Ok(Frames { end_s: found.end_s, found: PowerIntegral::new(&self.trace).frames(&found) })
     }
 

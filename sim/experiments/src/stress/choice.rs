@@ -4,27 +4,27 @@ use pipeline::Features;
 use serde::Serialize;
 use workloads::stress::{Family, Size};
 
-use super::measure::{Work, combinations, on_subject};
-use crate::study::table::{Sheet, Table};
+use super::measure::{MethodWork, combinations, on_subject};
+use crate::study::table::{Sheet, TableBuilder};
 use output::plot::{Matrix, MatrixPanel, Picture, PlotStyle};
 use run::{GpuSpec, RunError};
 
 /// Multiply-adds at one value of a family.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Trial {
+pub struct TestTrial {
     /// The family.
     pub family: &'static str,
     /// The value of its parameter.
     pub value: f64,
     /// Multiply-adds of `auto`.
     pub auto: u64,
-    /// Those of each of [`combinations`], in their order.
+    /// Multiply-adds of each of [`combinations`], in their order.
     pub fixed: Vec<u64>,
 }
 
 /// `auto` against the best fixed choice, at one value or over a whole family.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Choice {
+pub struct TestChoice {
     /// The family.
     pub family: &'static str,
     /// The value of its parameter; `None` for all of them added up.
@@ -33,7 +33,7 @@ pub struct Choice {
     pub auto_madds: u64,
     /// The letters of the best fixed choice.
     pub best: String,
-    /// Its multiply-adds.
+    /// Multiply-adds of the best choice.
     pub best_madds: u64,
     /// Multiply-adds with every test on.
     pub all_madds: u64,
@@ -54,12 +54,12 @@ pub fn trial(
     size: Size,
     seed: u64,
     gpu: &GpuSpec,
-) -> Result<Trial, RunError> {
+) -> Result<TestTrial, RunError> {
     on_subject(family, value, size, seed, gpu, |subject| {
-        let madds = |features| subject.counts(features).map(|counts| Work::new(&counts).madds());
+        let madds = |features| subject.counts(features).map(|counts| MethodWork::new(&counts).madds());
         let auto = madds(Features { auto: true, ..Features::ALL })?;
         let fixed = fixed(subject.camera.lens().is_some(), madds)?;
-        Ok(Trial { family: family.name, value, auto, fixed })
+        Ok(TestTrial { family: family.name, value, auto, fixed })
     })
 }
 
@@ -81,14 +81,14 @@ fn fixed<E>(lens: bool, madds: impl Fn(Features) -> Result<u64, E>) -> Result<Ve
     .collect()
 }
 
-impl Choice {
+impl TestChoice {
     /// Of one value.
-    pub fn of(trial: &Trial) -> Self {
+    pub fn of(trial: &TestTrial) -> Self {
         Self::new(trial.family, Some(trial.value), trial.auto, &trial.fixed)
     }
 
     /// Of all values of a family, one choice for all of them; `None` where there is none.
-    pub fn over(trials: &[Trial]) -> Option<Self> {
+    pub fn over(trials: &[TestTrial]) -> Option<Self> {
         let family = trials.first()?.family;
         let sum = |at: usize| trials.iter().map(|trial| trial.fixed[at]).sum();
         let fixed: Vec<u64> = (0..trials[0].fixed.len()).map(sum).collect();
@@ -113,18 +113,18 @@ impl Choice {
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Choices {
     /// Each family as a whole, one fixed choice for all of its values.
-    pub families: Vec<Choice>,
+    pub families: Vec<TestChoice>,
     /// Each value, with the best choice for it alone.
-    pub values: Vec<Choice>,
+    pub values: Vec<TestChoice>,
 }
 
 impl Choices {
     /// Of the trials, those of a family one after the other.
-    pub fn new(trials: &[Trial]) -> Self {
+    pub fn new(trials: &[TestTrial]) -> Self {
         let families = trials.chunk_by(|a, b| a.family == b.family);
         Self {
-            families: families.filter_map(Choice::over).collect(),
-            values: trials.iter().map(Choice::of).collect(),
+            families: families.filter_map(TestChoice::over).collect(),
+            values: trials.iter().map(TestChoice::of).collect(),
         }
     }
 
@@ -161,12 +161,12 @@ impl Choices {
     /// `auto` and every test on, over the best fixed choice: of each family as a whole, and at the value that
     /// is worst for it.
     pub(super) fn picture(&self, plot_style: &PlotStyle) -> Picture {
-        type Cost = fn(&Choice) -> f64;
+        type Cost = fn(&TestChoice) -> f64;
         let costs: [(&str, Cost); 2] = [
             ("auto", |choice| choice.over_best),
             ("all", |choice| choice.all_madds.max(1) as f64 / choice.best_madds.max(1) as f64),
         ];
-        let worst = |family: &Choice, cost: Cost| {
+        let worst = |family: &TestChoice, cost: Cost| {
             let values = self.values.iter().filter(|value| value.family == family.family);
             values.map(cost).reduce(f64::max)
         };
@@ -190,7 +190,7 @@ impl Choices {
 
     /// Families and values as a table.
     pub(super) fn sheet(&self) -> Sheet {
-        Table::of(self.families.iter().chain(&self.values))
+        TableBuilder::of(self.families.iter().chain(&self.values))
             .data("family", |choice| choice.family)
             .data("value", |choice| choice.value)
             .data("auto_madds", |choice| choice.auto_madds)
@@ -203,11 +203,11 @@ impl Choices {
     }
 }
 
-fn over(choices: &[Choice]) -> usize {
+fn over(choices: &[TestChoice]) -> usize {
     choices.iter().filter(|choice| choice.over_best > MAX_OVER_BEST).count()
 }
 
-fn worst(choices: &[Choice]) -> Option<&Choice> {
+fn worst(choices: &[TestChoice]) -> Option<&TestChoice> {
     choices.iter().max_by(|a, b| a.over_best.total_cmp(&b.over_best))
 }
 
@@ -218,8 +218,8 @@ mod tests {
 
     use super::*;
 
-    fn trial(value: f64, auto: u64, fixed: [u64; 2]) -> Trial {
-        Trial { family: "speed", value, auto, fixed: fixed.to_vec() }
+    fn trial(value: f64, auto: u64, fixed: [u64; 2]) -> TestTrial {
+        TestTrial { family: "speed", value, auto, fixed: fixed.to_vec() }
     }
 
     #[test]

@@ -8,7 +8,7 @@ use pipeline::random::mix;
 use pipeline::sampling::SampleSource;
 use pipeline::setup::{Triangle, bounds};
 use pipeline::traversal::{
-    Box5, EdgeBounds, Edges, Facing, LensLines, Piece, TileRect, TimePieces, View, narrow,
+    Box5, EdgeBounds, Edges, Facing, LensLines, Piece, TileRect, TileView, TimePieces, narrow,
 };
 use pipeline::{Camera, Draw, Features, PassError, PipelineSpec, RasterPass, Settings, Shear, Viewport};
 use run::{GpuSpec, RunError};
@@ -33,9 +33,9 @@ pub struct StressRow {
     pub samples_lost: u64,
     /// Source of the reference: `brute force` or `no tests`.
     pub compared_with: &'static str,
-    /// Its cost.
-    pub work: Work,
-    /// Its multiply-adds over those of the best method at this value.
+    /// Cost of the method.
+    pub work: MethodWork,
+    /// Multiply-adds of the method over those of the best method at this value.
     pub over_best: f64,
     /// Source of the true intervals: `exact roots` or `dense sampling`.
     pub truth: &'static str,
@@ -45,7 +45,7 @@ pub struct StressRow {
 
 /// Counted work of a method.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
-pub struct Work {
+pub struct MethodWork {
     /// Samples tested.
     pub samples_tested: u64,
     /// Samples found inside.
@@ -56,7 +56,7 @@ pub struct Work {
     pub sample_madds: u64,
 }
 
-impl Work {
+impl MethodWork {
     /// The work in `counts`.
     pub fn new(counts: &Counts) -> Self {
         Self {
@@ -104,7 +104,7 @@ pub fn measure(
                 triangles: subject.triangles(),
                 samples_lost: differing(&seen, &reference),
                 compared_with: if brute { "brute force" } else { "no tests" },
-                work: Work::new(&subject.counts(method.features)?),
+                work: MethodWork::new(&subject.counts(method.features)?),
                 over_best: 1.0,
                 truth: pairs.source(),
                 intervals: pairs.under(&method.features),
@@ -130,7 +130,7 @@ pub struct Pairs {
 
 struct Pair {
     triangle: Triangle,
-    place: Place,
+    place: TilePlace,
     truth: Option<Hulls>,
 }
 
@@ -185,7 +185,7 @@ impl Pairs {
             for tile in (0..here).filter(|tile| chosen(passed + tile, stride)) {
                 let [column, row] = [tile % across, tile / across].map(|step| step as u32);
                 let origin = [(rect.x0 + column) * side, (rect.y0 + row) * side];
-                let place = Place::new(subject.viewport, projection.shear, projection.near, origin, side);
+                let place = TilePlace::new(subject.viewport, projection.shear, projection.near, origin, side);
                 let truth = Truth::new(triangle, &projection.shear, &place.tile, projection.near);
                 // The truth asks where a triangle is, not which face it shows; so must the tests.
                 let triangle = Triangle { faces: [true; 2], ..*triangle };
@@ -209,7 +209,7 @@ impl Pairs {
     }
 
     /// Intervals under `bound`.
-    pub fn bounded(&self, bound: impl Fn(&Place, &Triangle) -> Option<Box5>) -> Intervals {
+    pub fn bounded(&self, bound: impl Fn(&TilePlace, &Triangle) -> Option<Box5>) -> Intervals {
         let mut sum = Intervals { pairs: self.pairs.len() as u64, ..Intervals::default() };
         let (mut volume, mut true_volume) = (0.0, 0.0);
         for pair in &self.pairs {
@@ -273,7 +273,7 @@ fn holds(found: &Hulls, truth: &Hulls) -> bool {
 /// A named set of tests.
 #[derive(Clone, Copy, Debug)]
 pub struct TestMethod {
-    /// Its name in tables and charts.
+    /// Name of the method in tables and charts.
     pub name: &'static str,
     /// The tests that are on.
     pub features: Features,
@@ -305,9 +305,9 @@ pub const METHODS: [TestMethod; 14] = [
 /// A test that can be switched on: its letter in charts, its name, and how.
 #[derive(Clone, Copy, Debug)]
 pub struct Switch {
-    /// Its letter in charts.
+    /// Letter of the switch in charts.
     pub letter: char,
-    /// Its name, as in a GPU file.
+    /// Name of the switch, as in a GPU file.
     pub name: &'static str,
     /// Switches it on.
     pub on: fn(&mut Features),
@@ -345,7 +345,7 @@ pub fn combinations() -> Vec<(String, Features)> {
 
 /// A tile with what the tests need to know of the camera.
 #[derive(Clone, Copy, Debug)]
-pub struct Place {
+pub struct TilePlace {
     /// The tile.
     pub tile: TileRect,
     /// The lens.
@@ -354,7 +354,7 @@ pub struct Place {
     pub near: f32,
 }
 
-impl Place {
+impl TilePlace {
     /// The tile of `side_px` pixels whose first pixel is `origin`.
     pub fn new(viewport: Viewport, shear: Shear, near: f32, origin: [u32; 2], side_px: u32) -> Self {
         Self { tile: TileRect::new(viewport, origin, side_px), shear, near }
@@ -380,7 +380,7 @@ impl Place {
 
     /// The times at which facing and edges let the triangle be seen.
     fn times(&self, features: &Features, triangle: &Triangle, within: &Box5) -> TimePieces {
-        let edges = Edges::<f64>::new(View::new(triangle, &self.shear, &self.tile, within));
+        let edges = Edges::<f64>::new(TileView::new(triangle, &self.shear, &self.tile, within));
         let mut times = TimePieces::one(Piece { t: within.t, faces: [true; 2] });
         if features.facing {
             times = Facing::new(&edges).timeline(within.t, triangle.faces, features.facing_splits).0;
@@ -428,7 +428,7 @@ pub fn on_subject<T>(
 }
 
 /// The triangle of each sample and the bits of its depth.
-pub type Seen = Vec<(u32, u32)>;
+pub type SeenSamples = Vec<(u32, u32)>;
 
 /// The most tests of a sample against a triangle that brute force may take.
 const MAX_TESTS: u64 = 200_000_000;
@@ -440,7 +440,7 @@ impl Subject<'_> {
     }
 
     /// The triangle that every sample sees with the tests of `features`.
-    pub fn seen(&self, features: Features) -> Result<Seen, PassError> {
+    pub fn seen(&self, features: Features) -> Result<SeenSamples, PassError> {
         self.with(features, |settings| RasterPass::new(self.camera, self.draws, settings).visibility())
     }
 
@@ -453,7 +453,7 @@ impl Subject<'_> {
 
     /// The triangle that every sample has to see: from all triangles against all samples where that is not
     /// too much, else from the pipeline with every test off. Also returns whether it was brute force.
-    pub fn reference(&self) -> Result<(Seen, bool), PassError> {
+    pub fn reference(&self) -> Result<(SeenSamples, bool), PassError> {
         let samples = self.viewport.pixels() as u64 * u64::from(self.samples.per_pixel());
         if samples * self.triangles() <= MAX_TESTS {
             Ok((brute_force(self.camera, self.draws, self.viewport, self.samples), true))
@@ -470,7 +470,7 @@ impl Subject<'_> {
 }
 
 /// Samples that differ: lost to another triangle, to none, or gained.
-pub fn differing(a: &Seen, b: &Seen) -> u64 {
+pub fn differing(a: &SeenSamples, b: &SeenSamples) -> u64 {
     a.iter().zip(b).filter(|(a, b)| a != b).count() as u64 + a.len().abs_diff(b.len()) as u64
 }
 

@@ -9,10 +9,12 @@ pub mod choice;
 pub mod measure;
 pub mod truth;
 
-use choice::{Choices, Trial};
+use choice::{Choices, TestTrial};
 use measure::{METHODS, StressRow, TestMethod};
 use output::dir::SUMMARY;
-use output::plot::{Chart, ChartPanel, Mark, Matrix, MatrixPanel, Paint, Picture, PlotStyle, Scale, Series};
+use output::plot::{
+    Chart, ChartPanel, Matrix, MatrixPanel, Paint, Picture, PlotMark, PlotStyle, Scale, Series,
+};
 use output::terminal::Progress;
 use output::{Claim, OutputError};
 use rayon::prelude::*;
@@ -20,7 +22,7 @@ use run::{GpuSpec, RunError};
 use serde::{Serialize, Serializer};
 use workloads::stress::{Family, Size, families, family};
 
-use crate::study::table::{Sheet, Table, count, fixed, optional, plain, share};
+use crate::study::table::{Sheet, TableBuilder, count, fixed, optional, plain, share};
 use crate::study::{Gallery, Study, StudyError, files};
 
 /// The seed of the scenes.
@@ -110,10 +112,10 @@ impl Study for StressChart {
             bar.inc();
             Ok((rows, trial))
         };
-        let measured: Vec<(Vec<StressRow>, Option<Trial>)> =
+        let measured: Vec<(Vec<StressRow>, Option<TestTrial>)> =
             cases.par_iter().map(measure).collect::<Result<_, RunError>>()?;
         let (rows, trials): (Vec<_>, Vec<_>) = measured.into_iter().unzip();
-        let trials: Vec<Trial> = trials.into_iter().flatten().collect();
+        let trials: Vec<TestTrial> = trials.into_iter().flatten().collect();
         let (rows, auto) = (rows.into_iter().flatten().collect(), Choices::new(&trials));
         Ok(Self { families: chosen, size, rows, auto })
     }
@@ -205,11 +207,11 @@ impl StressChart {
 
     /// The cost of every method at the worst value of each family.
     fn overview(&self) -> Sheet {
-        let table = Table::of(&self.families)
+        let table = TableBuilder::of(&self.families)
             .shown("family", |family| family.name, plain)
             .before("Cost over that of the best method, at the worst value of each family.\n\n")
             .after(self.below());
-        let method = |table: Table<_>, method: &TestMethod| {
+        let method = |table: TableBuilder<_>, method: &TestMethod| {
             let cost = |family: &&&'static Family| self.over_best(family, method.name, false);
             table.shown(method.name, cost, optional(fixed(2)))
         };
@@ -219,7 +221,7 @@ impl StressChart {
     /// Every number of one family.
     fn of_family(&self, family: &Family) -> Sheet {
         let of = |count: u64, row: &StressRow| count as f64 / row.intervals.pairs.max(1) as f64;
-        Table::of(self.of(family))
+        TableBuilder::of(self.of(family))
             .shown(family.parameter, |row| row.value, plain)
             .shown("method", |row| row.method, plain)
             .shown("lost", |row| row.samples_lost, plain)
@@ -240,7 +242,7 @@ impl StressChart {
     }
 
     fn row_sheet(&self) -> Sheet {
-        Table::of(&self.rows)
+        TableBuilder::of(&self.rows)
             .data("family", |row| row.family)
             .data("value", |row| row.value)
             .data("method", |row| row.method)
@@ -341,7 +343,7 @@ fn curves(report: &StressChart, family: &Family, measure: &Measure, plot_style: 
     };
     let all: Vec<Vec<(f64, f64)>> = METHODS.iter().map(|method| line(method.name)).collect();
     let panel = |(method, own): (&TestMethod, &Vec<(f64, f64)>)| {
-        let others = Series::new("", Mark::Faint(all.clone())).painted(Paint::Grey);
+        let others = Series::new("", PlotMark::Faint(all.clone())).painted(Paint::Grey);
         let own = Series::curve("", own.iter().copied()).painted(Paint::Like(0));
         ChartPanel::new(method.name, ["", measure.name], vec![others, own])
             .on(Scale::Even, measure.scale.clone())

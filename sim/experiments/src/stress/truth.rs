@@ -1,6 +1,6 @@
 //! The true interval of lens and time in which a triangle touches a tile.
 //!
-//! For a pinhole it is exact ([`Sweep`]). For a lens it is a lower bound: places where a point of the
+//! For a pinhole it is exact ([`SweptTriangle`]). For a lens it is a lower bound: places where a point of the
 //! triangle is seen at a point of the tile (solved for `u, v`), widened from the outermost of these by exact
 //! roots along `t`, `u` and `v` in turn.
 //!
@@ -24,10 +24,10 @@ type ExtremePoint = [f64; 3];
 /// A triangle, a lens and a tile.
 #[derive(Clone, Copy, Debug)]
 pub struct Truth {
-    ends: Sweep,
+    ends: SweptTriangle,
     s: DVec2,
     a: DVec2,
-    rect: Rect,
+    rect: ImageRect,
     near: f64,
     moving: bool,
 }
@@ -40,7 +40,7 @@ impl Truth {
         let to = triangle.corners.map(|corner| wide(corner.open) + wide(corner.delta));
         let [s, a] = [shear.s, shear.a].map(|c| DVec2::from(c.map(f64::from)));
         let (near, moving) = (f64::from(near), triangle.moving);
-        Self { ends: Sweep { from, to }, s, a, rect: Rect::new(tile), near, moving }
+        Self { ends: SweptTriangle { from, to }, s, a, rect: ImageRect::new(tile), near, moving }
     }
 
     /// Whether [`Self::hulls`] is exact rather than found from below.
@@ -107,19 +107,21 @@ impl Truth {
 
     /// Exact roots along each axis through a point.
     fn along_axes(&self, [u, v, t]: ExtremePoint, found: &mut Found) {
-        let along = |sweep: Sweep| sweep.touching(&self.rect, self.near);
+        let along = |sweep: SweptTriangle| sweep.touching(&self.rect, self.near);
         let ends = |point: fn(f64, ExtremePoint) -> ExtremePoint, hull: [f64; 2], found: &mut Found| {
             hull.into_iter().for_each(|s| found.add(point(s, [u, v, t])));
         };
         let of = |corners: [DVec3; 3], u: f64, v: f64| corners.map(|p| self.sheared(p, u, v));
         let now = self.ends.at(t);
-        if let Some(hull) = along(Sweep { from: of(self.ends.from, u, v), to: of(self.ends.to, u, v) }) {
+        if let Some(hull) =
+            along(SweptTriangle { from: of(self.ends.from, u, v), to: of(self.ends.to, u, v) })
+        {
             ends(|s, [u, v, _]| [u, v, s], hull, found);
         }
-        if let Some(hull) = along(Sweep { from: of(now, -1.0, v), to: of(now, 1.0, v) }) {
+        if let Some(hull) = along(SweptTriangle { from: of(now, -1.0, v), to: of(now, 1.0, v) }) {
             ends(|s, [_, v, t]| [2.0 * s - 1.0, v, t], hull, found);
         }
-        if let Some(hull) = along(Sweep { from: of(now, u, -1.0), to: of(now, u, 1.0) }) {
+        if let Some(hull) = along(SweptTriangle { from: of(now, u, -1.0), to: of(now, u, 1.0) }) {
             ends(|s, [u, _, t]| [u, 2.0 * s - 1.0, t], hull, found);
         }
     }
@@ -152,7 +154,7 @@ impl Found {
 
 /// Three vertices `[x, y, w]` at both ends of a parameter that runs from 0 to 1.
 #[derive(Clone, Copy, Debug)]
-pub struct Sweep {
+pub struct SweptTriangle {
     /// At 0.
     pub from: [DVec3; 3],
     /// At 1.
@@ -161,12 +163,12 @@ pub struct Sweep {
 
 /// A rectangle of the image in pixels from its centre.
 #[derive(Clone, Copy, Debug)]
-pub struct Rect {
+pub struct ImageRect {
     low: DVec2,
     high: DVec2,
 }
 
-impl Rect {
+impl ImageRect {
     /// The rectangle of a tile.
     pub fn new(tile: &TileRect) -> Self {
         let at = |end: usize| DVec2::new(f64::from(tile.x[end]), f64::from(tile.y[end]));
@@ -185,7 +187,7 @@ impl Rect {
     }
 }
 
-impl Sweep {
+impl SweptTriangle {
     /// The vertices at `s`.
     pub fn at(&self, s: f64) -> [DVec3; 3] {
         [0, 1, 2].map(|k| self.from[k] + s * (self.to[k] - self.from[k]))
@@ -197,7 +199,7 @@ impl Sweep {
     }
 
     /// The hull of the values of the parameter at which the part beyond `near` touches `rect`.
-    pub fn touching(&self, rect: &Rect, near: f64) -> Option<[f64; 2]> {
+    pub fn touching(&self, rect: &ImageRect, near: f64) -> Option<[f64; 2]> {
         let mut instants = vec![0.0, 1.0];
         self.instants(rect, near, &mut instants);
         instants.sort_by(f64::total_cmp);
@@ -210,7 +212,7 @@ impl Sweep {
         hull
     }
 
-    fn instants(&self, rect: &Rect, near: f64, into: &mut Vec<f64>) {
+    fn instants(&self, rect: &ImageRect, near: f64, into: &mut Vec<f64>) {
         let cut = !self.is_beyond(near);
         for k in 0..3 {
             for (axis, side) in sides(rect) {
@@ -233,7 +235,7 @@ impl Sweep {
     }
 }
 
-fn sides(rect: &Rect) -> [(usize, f64); 4] {
+fn sides(rect: &ImageRect) -> [(usize, f64); 4] {
     [(0, rect.low.x), (0, rect.high.x), (1, rect.low.y), (1, rect.high.y)]
 }
 
@@ -273,7 +275,7 @@ fn keep(root: f64, into: &mut Vec<f64>) {
 }
 
 /// Whether the part of a triangle beyond `near` touches the rectangle: clipped, projected, then separating axes.
-fn touches(corners: &[DVec3; 3], rect: &Rect, near: f64) -> bool {
+fn touches(corners: &[DVec3; 3], rect: &ImageRect, near: f64) -> bool {
     let (points, count) = clipped(corners, near);
     let points = &points[..count];
     if count < 3 {
@@ -365,8 +367,8 @@ mod tests {
         assert!(!truth.is_exact());
     }
 
-    fn rect() -> Rect {
-        Rect { low: DVec2::ZERO, high: DVec2::splat(8.0) }
+    fn rect() -> ImageRect {
+        ImageRect { low: DVec2::ZERO, high: DVec2::splat(8.0) }
     }
 
     fn triangle(x: f64, w: f64) -> [DVec3; 3] {
@@ -376,7 +378,7 @@ mod tests {
     #[test]
     fn a_passing_triangle_touches_from_its_front_to_its_rear() {
         // The front, 4 px ahead, is at 0 after 6 of 30 px; the rear is at 8 after 18.
-        let sweep = Sweep { from: triangle(-10.0, 2.0), to: triangle(20.0, 2.0) };
+        let sweep = SweptTriangle { from: triangle(-10.0, 2.0), to: triangle(20.0, 2.0) };
         let [first, last] = sweep.touching(&rect(), 0.1).unwrap();
         assert!((first - 0.2).abs() < 1e-12 && (last - 0.6).abs() < 1e-12, "{first} {last}");
         assert!(sweep.is_beyond(0.1));
@@ -387,17 +389,21 @@ mod tests {
         // An edge that runs along the diagonal passes the corner (0, 0); no vertex comes near.
         let at = |d: f64| [[d - 50.0, d + 50.0], [d + 50.0, d - 50.0], [d - 90.0, d - 90.0]];
         let [from, to] = [-10.0, 10.0].map(|d| at(d).map(|[x, y]| DVec3::new(x, y, 1.0)));
-        let [first, last] = Sweep { from, to }.touching(&rect(), 0.1).unwrap();
+        let [first, last] = SweptTriangle { from, to }.touching(&rect(), 0.1).unwrap();
         assert!((first - 0.5).abs() < 1e-12 && last == 1.0, "{first} {last}");
     }
 
     #[test]
     fn what_is_too_near_does_not_touch() {
-        let sweep = Sweep { from: triangle(1.0, 2.0), to: triangle(1.0, -2.0) };
+        let sweep = SweptTriangle { from: triangle(1.0, 2.0), to: triangle(1.0, -2.0) };
         let [first, last] = sweep.touching(&rect(), 1.0).unwrap();
         assert!(first == 0.0 && (last - 0.25).abs() < 1e-12, "{first} {last}");
         assert!(!sweep.is_beyond(1.0));
-        assert!(Sweep { from: triangle(1.0, 0.5), to: triangle(1.0, 0.5) }.touching(&rect(), 1.0).is_none());
+        assert!(
+            SweptTriangle { from: triangle(1.0, 0.5), to: triangle(1.0, 0.5) }
+                .touching(&rect(), 1.0)
+                .is_none()
+        );
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! Studies: something is measured, drawn and written in one go. A chart of the book and the failure catalogue
 //! are studies.
 //!
-//! - [`Study`]: what a study is; [`Entry`]: one of them in a list.
+//! - [`Study`]: what a study is; [`StudyEntry`]: one of them in a list.
 //! - [`table`]: tables whose columns are declared once.
 //! - [`tradeoff`]: speed against accuracy, the same few numbers for every method; one page of all studies.
 //! - [`Ran`]: work that a measurement ran, added up from the reports of its frames.
@@ -24,13 +24,13 @@ use tradeoff::TradeoffPoint;
 
 /// The result of a study: measured once, then drawn, written and printed. As JSON it is everything that was found.
 pub trait Study: Serialize + Sized {
-    /// Its name on the command line.
+    /// Name of the study on the command line.
     const NAME: &'static str;
-    /// Its subject, in one line.
+    /// Subject of the study, in one line.
     const ABOUT: &'static str;
     /// Paths of its pictures, without endings.
     const PICTURES: &'static [&'static str];
-    /// Its CSV files, and its JSON file, which is written last. Tables in Markdown are in `NAME.md`.
+    /// CSV files, and the JSON file, which is written last. Tables in Markdown are in `NAME.md`.
     const FILES: &'static [&'static str];
     /// Whether other scenes than its own can be given.
     const TAKES_SCENES: bool = false;
@@ -62,10 +62,10 @@ pub trait Study: Serialize + Sized {
     /// Those of the folder.
     fn draw(&self, to: &Gallery<'_>) -> Result<(), OutputError>;
 
-    /// Its tables, in the order in which they are printed.
+    /// Tables, in the order in which they are printed.
     fn tables(&self) -> Vec<Sheet>;
 
-    /// Its methods and their levels between speed and accuracy.
+    /// Methods and their levels between speed and accuracy.
     fn tradeoff(&self) -> Vec<TradeoffPoint> {
         Vec::new()
     }
@@ -123,7 +123,7 @@ impl Gallery<'_> {
 
 /// A request for a study.
 #[derive(Clone, Copy, Debug)]
-pub struct Request<'a> {
+pub struct StudyRequest<'a> {
     /// Whether a preview will do.
     pub quick: bool,
     /// Scenes besides its own.
@@ -141,11 +141,11 @@ pub struct Request<'a> {
 /// A study that is measured, drawn and written.
 #[derive(Clone, Debug)]
 pub struct Done {
-    /// Its tables and what else is to be said of it, in whole lines.
+    /// Tables and what else is to be said of the study, in whole lines.
     pub text: String,
     /// Everything it found.
     pub json: String,
-    /// Its methods and their levels between speed and accuracy.
+    /// Methods and their levels between speed and accuracy.
     pub tradeoff: Vec<TradeoffPoint>,
     /// A promise that it found broken.
     pub fault: Option<String>,
@@ -184,20 +184,20 @@ fn write<S: Study>(
 
 /// A study in a list of studies.
 #[derive(Clone, Copy, Debug)]
-pub struct Entry {
-    /// Its name on the command line.
+pub struct StudyEntry {
+    /// Name of the study on the command line.
     pub name: &'static str,
-    /// Its subject, in one line.
+    /// Subject of the study, in one line.
     pub about: &'static str,
     /// Whether other scenes than its own can be given.
     pub takes_scenes: bool,
     /// Whether a seed can be given.
     pub takes_seed: bool,
     claim: fn() -> Claim,
-    run: fn(&Request<'_>) -> Result<Done, StudyError>,
+    run: fn(&StudyRequest<'_>) -> Result<Done, StudyError>,
 }
 
-impl Entry {
+impl StudyEntry {
     /// The entry of a study.
     pub const fn of<S: Study>() -> Self {
         Self {
@@ -219,12 +219,12 @@ impl Entry {
     ///
     /// # Errors
     /// [`StudyError`], above all when the folder cannot be written to.
-    pub fn run(&self, request: &Request<'_>) -> Result<Done, StudyError> {
+    pub fn run(&self, request: &StudyRequest<'_>) -> Result<Done, StudyError> {
         (self.run)(request)
     }
 }
 
-fn run<S: Study>(request: &Request<'_>) -> Result<Done, StudyError> {
+fn run<S: Study>(request: &StudyRequest<'_>) -> Result<Done, StudyError> {
     let started = Instant::now();
     let effort = if request.quick { S::QUICK } else { S::FULL };
     let effort = match request.seed {

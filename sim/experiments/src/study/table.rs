@@ -84,7 +84,7 @@ pub fn optional<V>(show: impl Fn(V) -> String) -> impl Fn(Option<V>) -> String {
 
 /// A table while its columns are declared.
 #[derive(Debug)]
-pub struct Table<R> {
+pub struct TableBuilder<R> {
     rows: Vec<R>,
     sheet: Sheet,
 }
@@ -111,7 +111,7 @@ struct Column {
     detail: bool,
 }
 
-impl<R> Table<R> {
+impl<R> TableBuilder<R> {
     /// A table of these rows, without columns yet.
     pub fn of(rows: impl IntoIterator<Item = R>) -> Self {
         let rows: Vec<R> = rows.into_iter().collect();
@@ -267,7 +267,7 @@ mod tests {
 
     #[test]
     fn a_column_is_declared_once_and_comes_out_in_every_form() {
-        let sheet = Table::of([("a", 0.5, Some(2_u32)), ("b", 1.0, None)])
+        let sheet = TableBuilder::of([("a", 0.5, Some(2_u32)), ("b", 1.0, None)])
             .column("name", "what", |row| row.0, plain)
             .column("error", "RMSE", |row| row.1, fixed(2))
             .data("count", |row| row.2)
@@ -285,7 +285,7 @@ mod tests {
         let json = serde_json::to_string(&sheet).unwrap();
         let second = r#"{"name":"b","error":1.0,"count":null}"#;
         assert_eq!(json, format!(r#"[{{"name":"a","error":0.5,"count":2}},{second}]"#));
-        let hidden = Table::of([1_u32]).data("n", |n| *n).sheet();
+        let hidden = TableBuilder::of([1_u32]).data("n", |n| *n).sheet();
         assert!(hidden.text().is_none() && hidden.markdown().is_none());
     }
 }

@@ -1,24 +1,24 @@
 //! Speed against accuracy, the same few numbers for every method of every study, and the page of all studies.
 
 use minijinja::{Environment, context};
-use output::plot::{AxisSpec, Chart, ChartPanel, Mark, Paint, Picture, PlotStyle, Scale, Series};
+use output::plot::{AxisSpec, Chart, ChartPanel, Paint, Picture, PlotMark, PlotStyle, Scale, Series};
 use output::report::ReportError;
 use output::table::digits;
 use output::{Claim, OutDir, OutputError};
 use serde::Serialize;
 
-use super::table::{Sheet, Table, plain};
+use super::table::{Sheet, TableBuilder, plain};
 
 /// A measured quantity of which less is better, beside that of the reference.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Metric {
-    /// Its name, for example `RMSE`.
+    /// Name of the metric, for example `RMSE`.
     pub name: &'static str,
-    /// Its unit; empty for a number without one.
+    /// Unit of the metric; empty for a number without one.
     pub unit: &'static str,
-    /// Its value.
+    /// Value of the metric.
     pub value: f64,
-    /// That of the reference, where it is known.
+    /// Value of the reference, where it is known.
     pub reference: Option<f64>,
 }
 
@@ -64,11 +64,11 @@ pub struct TradeoffPoint {
     pub subject: String,
     /// The method, for example `packet`.
     pub method: String,
-    /// Its level, for example `16 samples a pixel`; empty where it has one alone.
+    /// Level of the method, for example `16 samples a pixel`; empty where it has one alone.
     pub level: String,
     /// Error.
     pub error: Metric,
-    /// Its cost.
+    /// Cost of the method.
     pub cost: Metric,
 }
 
@@ -121,7 +121,7 @@ pub struct Tradeoff {
 pub const PICTURE: &str = "tradeoff";
 
 impl Tradeoff {
-    /// Its files.
+    /// Adds the files of the trade-off to a claim.
     pub fn add_to(claim: Claim) -> Claim {
         claim.plots([PICTURE]).files(["tradeoff.csv", "tradeoff.md", "tradeoff.json"])
     }
@@ -133,7 +133,7 @@ impl Tradeoff {
 
     /// All numbers.
     pub fn sheet(&self) -> Sheet {
-        Table::of(&self.points)
+        TableBuilder::of(&self.points)
             .column("study", "study", |point| point.study, plain)
             .column("subject", "what is found", |point| point.subject.as_str(), plain)
             .column("method", "method", |point| point.method.as_str(), plain)
@@ -188,11 +188,11 @@ impl Tradeoff {
         let fronts = groups(points.iter().copied(), TradeoffPoint::competes_with);
         let fronts: Vec<Vec<(f64, f64)>> = fronts.iter().map(|points| self.front(points)).collect();
         let lines = fronts.into_iter().filter(|front| front.len() > 1);
-        let lines = lines.map(|front| Series::new("", Mark::Steps(front)).painted(Paint::Grey));
+        let lines = lines.map(|front| Series::new("", PlotMark::Steps(front)).painted(Paint::Grey));
         let methods = groups(points.iter().copied(), |a, b| a.method == b.method);
         let dots = methods.iter().enumerate().map(|(place, points)| {
             let place_of = |point: &&TradeoffPoint| (point.cost.value, point.error.value, String::new());
-            let dots = Mark::Dots(points.iter().map(place_of).collect());
+            let dots = PlotMark::Dots(points.iter().map(place_of).collect());
             Series::new(points[0].method.as_str(), dots).painted(Paint::Like(place))
         });
         let [error, cost] = [&points[0].error, &points[0].cost];
@@ -242,16 +242,16 @@ const TEMPLATE_NAME: &str = "charts.html";
 
 /// A study on the page.
 #[derive(Clone, Debug, Default, Serialize)]
-pub struct Section {
-    /// Its name on the command line.
+pub struct StudySection {
+    /// Name of the study on the command line.
     pub name: String,
-    /// Its subject, in one line.
+    /// Subject of the study, in one line.
     pub about: String,
-    /// Its tables, as printed.
+    /// Tables, as printed.
     pub text: String,
-    /// Its pictures: paths relative to the page, without ending; each is there as `.svg` and `.png`.
+    /// Pictures: paths relative to the page, without ending; each is there as `.svg` and `.png`.
     pub pictures: Vec<String>,
-    /// Its other files, relative to the page.
+    /// Other files, relative to the page.
     pub files: Vec<String>,
     /// Seconds of the clock on the wall that it took.
     pub took_s: f64,
@@ -263,10 +263,10 @@ pub struct Index {
     /// The command that makes it.
     pub command: String,
     /// The studies, in the order in which they were made.
-    pub sections: Vec<Section>,
+    pub sections: Vec<StudySection>,
     /// Names of those that are still to come.
     pub missing: Vec<String>,
-    /// Their methods between speed and accuracy.
+    /// Methods of all studies between speed and accuracy.
     #[serde(skip)]
     pub tradeoff: Tradeoff,
 }
@@ -284,7 +284,7 @@ struct Line<'a> {
     optimal: bool,
 }
 
-impl Section {
+impl StudySection {
     /// Adds the files of the study, by their names relative to the page.
     #[must_use]
     pub fn with_files(mut self, files: Vec<String>) -> Self {
@@ -388,7 +388,8 @@ mod tests {
     #[test]
     fn names_are_escaped_and_speed_against_accuracy_is_there() {
         let folder = tempfile::tempdir().unwrap();
-        let section = Section { name: "<b>".into(), text: "1 < 2".into(), took_s: 1.0, ..Section::default() };
+        let section =
+            StudySection { name: "<b>".into(), text: "1 < 2".into(), took_s: 1.0, ..StudySection::default() };
         let section = section.with_files(["p.csv", "p.png", "p.svg"].map(str::to_owned).into());
         assert_eq!(
             (&section.pictures[..], &section.files[..]),

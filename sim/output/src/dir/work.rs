@@ -50,7 +50,7 @@ pub(super) enum Owner {
     Ours,
     /// A file of the user or of another command, with the reason.
     User(String),
-    /// It is a folder.
+    /// The path is a folder.
     Folder,
 }
 

@@ -183,7 +183,7 @@ impl<'a> Chart<'a> {
 mod tests {
     use super::super::axis::{AxisSpec, Scale};
     use super::super::picture::Shape;
-    use super::super::series::{Mark, Paint, Series, Spread};
+    use super::super::series::{Paint, PlotMark, Series, SpreadPoint};
     use super::*;
 
     fn texts(picture: &Picture) -> Vec<&str> {
@@ -195,7 +195,7 @@ mod tests {
     }
 
     fn dots(points: &[(f64, f64)]) -> Series {
-        Series::new("dots", Mark::Dots(points.iter().map(|&(x, y)| (x, y, String::new())).collect()))
+        Series::new("dots", PlotMark::Dots(points.iter().map(|&(x, y)| (x, y, String::new())).collect()))
     }
 
     fn even(series: Vec<Series>) -> ChartPanel {
@@ -259,13 +259,13 @@ mod tests {
     fn markers_of_every_kind_stay_within_their_panel() {
         let places = [(0.0, 0.0), (1.0, 5.0), (19.0, 1e-3), (19.0, 900.0)];
         let named = || places.map(|(x, y)| (x, y, String::new())).to_vec();
-        let spread = |(x, y)| Spread { at: (x, y), across: [x, x], up: [y, y], name: String::new() };
+        let spread = |(x, y)| SpreadPoint { at: (x, y), across: [x, x], up: [y, y], name: String::new() };
         let marks = || {
             [
-                Mark::Dots(named()),
-                Mark::Rings(named()),
-                Mark::Curve(places.into()),
-                Mark::Spreads(places.map(spread).into()),
+                PlotMark::Dots(named()),
+                PlotMark::Rings(named()),
+                PlotMark::Curve(places.into()),
+                PlotMark::Spreads(places.map(spread).into()),
             ]
         };
         let names = (0..20).map(|number| number.to_string()).collect();
@@ -314,7 +314,7 @@ mod tests {
         let panel = |name: &str| ChartPanel {
             title: name.to_owned(),
             ..even(vec![
-                Series::new("", Mark::Faint(vec![vec![(0.0, 0.0), (1.0, 1.0)]])).painted(Paint::Grey),
+                Series::new("", PlotMark::Faint(vec![vec![(0.0, 0.0), (1.0, 1.0)]])).painted(Paint::Grey),
                 Series::curve(name, [(0.0, 0.0), (1.0, 1.0)]),
             ])
         };

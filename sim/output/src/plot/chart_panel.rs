@@ -5,7 +5,7 @@ use std::ops::Range;
 use super::axis::{Along, Axis, AxisSpec, Extent, Scale};
 use super::panel::{self, BELOW, Key, LEGEND_LINE, LEGEND_PX, Label, Panel, aside, legend_column, plate};
 use super::picture::{Across, Picture, Text, shortened, text, text_width, wrapped};
-use super::series::{Mark, Series};
+use super::series::{PlotMark, Series};
 use super::{INK, MARK, MUTED};
 
 /// Font size of the label of a marked range.
@@ -119,7 +119,7 @@ impl ChartPanel {
     pub(super) fn write_names(&self, picture: &mut Picture, area: &Panel) {
         let mut labels = Vec::new();
         for series in self.series.iter().rev() {
-            let bold = matches!(series.mark, Mark::Spreads(_));
+            let bold = matches!(series.mark, PlotMark::Spreads(_));
             let colour = if bold || labels.is_empty() { INK } else { MUTED };
             let names = series.mark.names(area).into_iter();
             labels.extend(names.map(|(at, radius, name)| Label { name, at, radius, colour, bold }));

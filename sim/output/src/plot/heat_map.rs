@@ -12,17 +12,17 @@ use crate::table::digits;
 /// A rectangle of the image with a value.
 #[derive(Clone, Copy, Debug)]
 pub struct HeatTile {
-    /// Its first pixel.
+    /// First pixel of the tile.
     pub origin: [u32; 2],
-    /// Its pixels across and down.
+    /// Pixels across and down.
     pub size: [u32; 2],
-    /// Its value.
+    /// Value of the tile.
     pub value: f64,
 }
 
 /// Mapping of values to colours.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub enum Shading<'a> {
+pub enum HeatScale<'a> {
     /// 0 to the largest value.
     #[default]
     Even,
@@ -49,7 +49,7 @@ pub struct HeatMapPlot<'a> {
     /// The rectangles, which cover the image.
     pub tiles: &'a [HeatTile],
     /// Mapping to colours.
-    pub shading: Shading<'a>,
+    pub shading: HeatScale<'a>,
     /// Displayed brightness of each pixel, 0 to 1. Its outlines are drawn over the map; empty for none.
     pub brightness: &'a [f32],
 }
@@ -72,7 +72,7 @@ impl HeatMapPlot<'_> {
         let most = self.tiles.iter().map(|tile| tile.value).fold(0.0, f64::max);
         let high = self.high(most);
         let subject = match self.shading {
-            Shading::Clipped if high < most => {
+            HeatScale::Clipped if high < most => {
                 format!(
                     "{}; darkest from {} on, the 99th percentile; most: {}",
                     self.subject,
@@ -87,7 +87,7 @@ impl HeatMapPlot<'_> {
         if self.tiles.is_empty() || !is_drawable(0.0, high) {
             return picture.nothing("nothing was counted");
         }
-        if let Shading::Classes(names) = self.shading {
+        if let HeatScale::Classes(names) = self.shading {
             let top = picture.height + 10.0;
             let keys =
                 names.iter().zip(CLASSES).map(|(name, colour)| (Key::Area(colour), (*name).to_owned()));
@@ -110,15 +110,15 @@ impl HeatMapPlot<'_> {
     }
 
     fn is_classes(&self) -> bool {
-        matches!(self.shading, Shading::Classes(_))
+        matches!(self.shading, HeatScale::Classes(_))
     }
 
     /// Value of the darkest colour.
     fn high(&self, most: f64) -> f64 {
         match self.shading {
-            Shading::Even | Shading::Classes(_) => most,
-            Shading::UpTo(high) => high,
-            Shading::Clipped => {
+            HeatScale::Even | HeatScale::Classes(_) => most,
+            HeatScale::UpTo(high) => high,
+            HeatScale::Clipped => {
                 let mut values: Vec<f64> =
                     self.tiles.iter().map(|tile| tile.value).filter(|value| *value > 0.0).collect();
                 values.sort_by(f64::total_cmp);
@@ -129,7 +129,7 @@ impl HeatMapPlot<'_> {
 
     fn colour(&self, value: f64, high: f64) -> Colour {
         match self.shading {
-            Shading::Classes(_) => CLASSES[(value.max(0.0) as usize).min(CLASSES.len() - 1)],
+            HeatScale::Classes(_) => CLASSES[(value.max(0.0) as usize).min(CLASSES.len() - 1)],
             _ => heat(if high > 0.0 { value / high } else { 0.0 }),
         }
     }
@@ -381,7 +381,7 @@ mod tests {
     use super::super::picture::Shape;
     use super::*;
 
-    fn plot<'a>(tiles: &'a [HeatTile], shading: Shading<'a>, brightness: &'a [f32]) -> HeatMapPlot<'a> {
+    fn plot<'a>(tiles: &'a [HeatTile], shading: HeatScale<'a>, brightness: &'a [f32]) -> HeatMapPlot<'a> {
         HeatMapPlot { title: "t", subject: "s", label: "l", size: [200, 1], tiles, shading, brightness }
     }
 
@@ -401,13 +401,13 @@ mod tests {
     #[test]
     fn one_hot_pixel_leaves_the_others_their_colours() {
         let tiles = row(|x| if x == 7 { 820.0 } else { f64::from(x % 10) + 1.0 });
-        let picture = plot(&tiles, Shading::Clipped, &[]).picture(&PlotStyle::default());
+        let picture = plot(&tiles, HeatScale::Clipped, &[]).picture(&PlotStyle::default());
         let fills = fills_of(&picture);
         assert_eq!(fills[9], heat(1.0), "ten of one in ten is the darkest");
         assert_eq!(fills[7], heat(1.0));
         let svg = picture.svg().unwrap();
         assert!(svg.contains("≥ 10.00") && svg.contains("most: 820.0"), "{svg}");
-        let even = plot(&tiles, Shading::Even, &[]).picture(&PlotStyle::default());
+        let even = plot(&tiles, HeatScale::Even, &[]).picture(&PlotStyle::default());
         assert_eq!(fills_of(&even)[9], heat(10.0 / 820.0), "nearly white");
     }
 
@@ -417,15 +417,15 @@ mod tests {
             let tiles = row(|x| if x == 0 { most } else { 10.0 });
             fills_of(&plot(&tiles, shading, &[]).picture(&PlotStyle::default()))[1]
         };
-        assert_eq!(shade(20.0, Shading::UpTo(40.0)), shade(40.0, Shading::UpTo(40.0)));
-        assert_ne!(shade(20.0, Shading::Even), shade(40.0, Shading::Even));
+        assert_eq!(shade(20.0, HeatScale::UpTo(40.0)), shade(40.0, HeatScale::UpTo(40.0)));
+        assert_ne!(shade(20.0, HeatScale::Even), shade(40.0, HeatScale::Even));
     }
 
     #[test]
     fn classes_are_named_and_have_no_shades_between_them() {
         let names = ["not shaded", "shaded without light", "with light"];
         let picture =
-            plot(&row(|x| f64::from(x % 3)), Shading::Classes(&names), &[]).picture(&PlotStyle::default());
+            plot(&row(|x| f64::from(x % 3)), HeatScale::Classes(&names), &[]).picture(&PlotStyle::default());
         let svg = picture.svg().unwrap();
         assert!(names.iter().all(|name| svg.contains(name)));
         let fills = fills_of(&picture);
@@ -436,7 +436,7 @@ mod tests {
     fn outlines_of_the_image_are_drawn_over_the_map() {
         let brightness: Vec<f32> = (0..200).map(|x| if x < 100 { 0.1 } else { 0.9 }).collect();
         let dark = |brightness: &[f32]| {
-            let picture = plot(&row(|_| 1.0), Shading::Even, brightness).picture(&PlotStyle::default());
+            let picture = plot(&row(|_| 1.0), HeatScale::Even, brightness).picture(&PlotStyle::default());
             fills_of(&picture).iter().filter(|fill| fill.rgb == INK.rgb).count()
         };
         assert_eq!((dark(&brightness), dark(&[])), (1, 0));

@@ -37,11 +37,11 @@ pub use axis::{AxisSpec, Scale};
 pub use chart::Chart;
 pub use chart_panel::ChartPanel;
 pub use frame_plots::{FramePowerPlot, PowerPart, StallLane, UnitLane, UnitPlot};
-pub use heat_map::{CaptionedImage, HeatMapPlot, HeatTile, Images, Matrix, MatrixPanel, Shading};
+pub use heat_map::{CaptionedImage, HeatMapPlot, HeatScale, HeatTile, Images, Matrix, MatrixPanel};
 pub use picture::{COLUMN_MM, Picture, PlotStyle, undrawable};
 pub use render::PlotError;
 pub use run_plots::{FrameEnergyPlot, FrameEnergyPoint, PowerRun};
-pub use series::{Mark, Paint, Series, Spread};
+pub use series::{Paint, PlotMark, Series, SpreadPoint};
 
 /// An sRGB colour with opacity.
 #[derive(Clone, Copy, Debug, PartialEq)]

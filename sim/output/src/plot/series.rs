@@ -6,7 +6,7 @@ use super::{BACKGROUND, FAINT, INK};
 
 /// Kind and data of a series.
 #[derive(Clone, Debug)]
-pub enum Mark {
+pub enum PlotMark {
     /// A filled band from the lowest to the highest value at each position.
     Band(Vec<(f64, f64, f64)>),
     /// A line through points.
@@ -20,7 +20,7 @@ pub enum Mark {
     /// Hollow markers, each with a name that may be empty.
     Rings(Vec<(f64, f64, String)>),
     /// Large markers, each with a cross that shows its spread.
-    Spreads(Vec<Spread>),
+    Spreads(Vec<SpreadPoint>),
     /// Pareto frontier as a staircase: level until the next point.
     Steps(Vec<(f64, f64)>),
     /// Bars from zero, `(from, to, height)`.
@@ -31,7 +31,7 @@ pub enum Mark {
 
 /// A point with its spread.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Spread {
+pub struct SpreadPoint {
     /// Position.
     pub at: (f64, f64),
     /// Horizontal range.
@@ -42,11 +42,23 @@ pub struct Spread {
     pub name: String,
 }
 
-impl Spread {
+impl SpreadPoint {
     /// The lines of its cross.
     fn cross(&self) -> [[(f64, f64); 2]; 2] {
         let ((x, y), [x0, x1], [y0, y1]) = (self.at, self.across, self.up);
         [[(x0, y), (x1, y)], [(x, y0), (x, y1)]]
+    }
+
+    /// Draws its cross and its marker, both with an edge in the colour of the background.
+    fn draw(&self, panel: &Panel, style: Style, picture: &mut Picture) {
+        for line in self.cross() {
+            let line: Vec<Point> = line.iter().filter_map(|&point| panel.place(point)).collect();
+            picture.polyline(line.clone(), BACKGROUND, 4.5);
+            picture.polyline(line, style.colour, 2.0);
+        }
+        let Some(at) = panel.place(self.at) else { return };
+        Style { colour: BACKGROUND, ..style }.marker(picture, at, RADII[2] + 1.5);
+        style.marker(picture, at, RADII[2]);
     }
 }
 
@@ -56,7 +68,7 @@ pub enum Paint {
     /// By its index in the panel.
     #[default]
     Own,
-    /// Those of the series with this index.
+    /// Colour and marker of the series with this index.
     Like(usize),
     /// The colour of text.
     Ink,
@@ -72,20 +84,20 @@ pub struct Series {
     /// Note in the panel, for example an exponent.
     pub note: String,
     /// Data. Connected points are ordered from left to right. Points that an axis cannot show are omitted.
-    pub mark: Mark,
-    /// Its colour and marker.
+    pub mark: PlotMark,
+    /// Colour and marker.
     pub paint: Paint,
 }
 
 impl Series {
     /// A series in the default style.
-    pub fn new(name: impl Into<String>, mark: Mark) -> Self {
+    pub fn new(name: impl Into<String>, mark: PlotMark) -> Self {
         Self { name: name.into(), note: String::new(), mark, paint: Paint::Own }
     }
 
     /// A line with markers.
     pub fn curve(name: impl Into<String>, points: impl IntoIterator<Item = (f64, f64)>) -> Self {
-        Self::new(name, Mark::Curve(points.into_iter().collect()))
+        Self::new(name, PlotMark::Curve(points.into_iter().collect()))
     }
 
     /// The same with another style.
@@ -128,7 +140,7 @@ fn dot_radius(count: usize, above: usize) -> f64 {
     RADII[usize::from(count <= MANY)] + RIM_PX * above.min(MAX_ABOVE) as f64
 }
 
-impl Mark {
+impl PlotMark {
     /// All values of `x` and `y` that the axes must include.
     pub(super) fn values(&self) -> [Vec<f64>; 2] {
         let points: Vec<Point> = match self {
@@ -210,7 +222,7 @@ impl Mark {
                 dots.iter().filter_map(|&(x, y, _)| panel.place((x, y))).collect()
             }
             Self::Spreads(spreads) => {
-                spreads.iter().flat_map(Spread::cross).flat_map(|line| along(&path(&line))).collect()
+                spreads.iter().flat_map(SpreadPoint::cross).flat_map(|line| along(&path(&line))).collect()
             }
             Self::Line(points) | Self::Curve(points) => along(&path(points)),
             Self::Steps(points) => along(&stairs(&path(points))),
@@ -258,17 +270,7 @@ impl Mark {
                     }
                 }
             }
-            Self::Spreads(spreads) => {
-                for spread in spreads {
-                    for line in spread.cross().map(|line| path(&line)) {
-                        picture.polyline(line.clone(), BACKGROUND, 4.5);
-                        picture.polyline(line, colour, 2.0);
-                    }
-                    let Some(at) = panel.place(spread.at) else { continue };
-                    Style { colour: BACKGROUND, ..style }.marker(picture, at, RADII[2] + 1.5);
-                    style.marker(picture, at, RADII[2]);
-                }
-            }
+            Self::Spreads(spreads) => spreads.iter().for_each(|spread| spread.draw(panel, style, picture)),
             Self::Steps(points) => picture.polyline(stairs(&path(points)), colour, 1.3),
             Self::Bars(bars) => {
                 for &(from, to, y) in bars {

@@ -219,21 +219,21 @@ fn curves_and_their_legends_fit() {
 fn every_mark_is_drawn_and_nothing_says_so() {
     let points = |name: &str| vec![(0.5, 1.5, name.to_owned()), (0.7, 0.2, String::new())];
     let marks = [
-        Mark::Band(vec![(0.0, 1.0, 2.0)]),
-        Mark::Line(vec![(0.0, 1.0), (1.0, 2.0)]),
-        Mark::Curve(vec![(0.0, 1.0), (1.0, 2.0)]),
-        Mark::Faint(vec![vec![(0.0, 1.0), (1.0, 2.0)]]),
-        Mark::Dots(points("named")),
-        Mark::Rings(points("ring")),
-        Mark::Bars(vec![(0.0, 1.0, 3.0)]),
-        Mark::Spreads(vec![Spread {
+        PlotMark::Band(vec![(0.0, 1.0, 2.0)]),
+        PlotMark::Line(vec![(0.0, 1.0), (1.0, 2.0)]),
+        PlotMark::Curve(vec![(0.0, 1.0), (1.0, 2.0)]),
+        PlotMark::Faint(vec![vec![(0.0, 1.0), (1.0, 2.0)]]),
+        PlotMark::Dots(points("named")),
+        PlotMark::Rings(points("ring")),
+        PlotMark::Bars(vec![(0.0, 1.0, 3.0)]),
+        PlotMark::Spreads(vec![SpreadPoint {
             at: (0.5, 1.5),
             across: [0.4, 0.8],
             up: [1.0, 2.0],
             name: "middle".to_owned(),
         }]),
-        Mark::Steps(vec![(0.2, 1.0), (0.6, 0.5), (0.9, 0.1)]),
-        Mark::Uprights(vec![0.3, f64::NAN]),
+        PlotMark::Steps(vec![(0.2, 1.0), (0.6, 0.5), (0.9, 0.1)]),
+        PlotMark::Uprights(vec![0.3, f64::NAN]),
     ];
     let series: Vec<Series> = marks.into_iter().map(|mark| Series::new("a", mark)).collect();
     let panel =
@@ -268,7 +268,7 @@ fn heat_maps_of_any_shape_fit() {
         let (title, subject) =
             ("samples_tested per pixel, frame 12", "default on reference: 6,364,653 in all");
         for shading in
-            [Shading::Even, Shading::Clipped, Shading::UpTo(4.0), Shading::Classes(&["none", "some"])]
+            [HeatScale::Even, HeatScale::Clipped, HeatScale::UpTo(4.0), HeatScale::Classes(&["none", "some"])]
         {
             let label = "events per pixel";
             let plot = HeatMapPlot { title, subject, label, size, tiles: &tiles, shading, brightness: &[] };

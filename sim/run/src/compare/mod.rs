@@ -16,7 +16,7 @@ use output::image::{LinearImage, encode_png};
 use pipeline::texture::{linear_to_srgb8, srgb8_to_linear};
 use serde::Serialize;
 
-pub use runs::{Change, RunComparison, Setting, TableComparison, shown};
+pub use runs::{ComparedSetting, RunComparison, TableComparison, ValueChange, shown};
 
 /// Error of a comparison.
 #[derive(Debug, thiserror::Error)]
@@ -189,7 +189,7 @@ pub struct FolderComparison {
     /// The folders.
     pub files: [String; 2],
     /// Images in both folders, by name.
-    pub images: Vec<Named>,
+    pub images: Vec<NamedComparison>,
     /// Images only in A.
     pub only_in_a: Vec<String>,
     /// Images only in B.
@@ -202,7 +202,7 @@ pub struct FolderComparison {
 
 /// Comparison of two images of equal name.
 #[derive(Clone, Debug, Serialize)]
-pub struct Named {
+pub struct NamedComparison {
     /// The name.
     pub name: String,
     /// The comparison.
@@ -381,7 +381,7 @@ fn compare_folders(a: &Path, b: &Path) -> Result<FolderComparison, CompareError>
     let mut images = Vec::new();
     for name in in_a.intersection(&in_b) {
         let comparison = compare_images(&a.join(name), &b.join(name), None)?;
-        images.push(Named { name: name.clone(), comparison });
+        images.push(NamedComparison { name: name.clone(), comparison });
     }
     let mean = images.iter().map(|image| image.comparison.mse).sum::<f64>() / images.len().max(1) as f64;
     Ok(FolderComparison {

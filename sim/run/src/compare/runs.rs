@@ -22,14 +22,14 @@ pub struct RunComparison {
     /// Quantities whose order the stated errors of the runs leave open.
     pub undecided: Vec<String>,
     /// Settings and inputs that differ.
-    pub settings: Vec<Setting>,
+    pub settings: Vec<ComparedSetting>,
     /// All numbers of both runs, in the order of the file.
-    pub values: Vec<Change>,
+    pub values: Vec<ValueChange>,
 }
 
 /// A setting or input of both runs.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Setting {
+pub struct ComparedSetting {
     /// Path of the key in the file.
     pub name: String,
     /// Value in A; null if missing.
@@ -193,14 +193,14 @@ pub fn shown(value: &Value) -> String {
     }
 }
 
-fn settings(runs: &[Value; 2]) -> Vec<Setting> {
+fn settings(runs: &[Value; 2]) -> Vec<ComparedSetting> {
     let pairs = SETTINGS.iter().flat_map(|key| leaves(key, [&runs[0][key], &runs[1][key]]));
     let differs = |(name, [a, b]): &(String, [&Value; 2])| {
         a != b && !RESULTS.iter().any(|result| name.starts_with(result))
     };
-    let made = |(name, [a, b]): (String, [&Value; 2])| Setting { name, a: a.clone(), b: b.clone() };
+    let made = |(name, [a, b]): (String, [&Value; 2])| ComparedSetting { name, a: a.clone(), b: b.clone() };
     let [a, b] = runs.each_ref().map(options);
-    let options = (a != b).then(|| Setting { name: "options".to_owned(), a, b });
+    let options = (a != b).then(|| ComparedSetting { name: "options".to_owned(), a, b });
     pairs.filter(differs).map(made).chain(options).collect()
 }
 
@@ -216,8 +216,8 @@ fn options(run: &Value) -> Value {
     if all.is_empty() { Value::Null } else { Value::String(all.join(" ")) }
 }
 
-fn values(runs: &[Value; 2]) -> Vec<Change> {
-    let mut values: Vec<Change> = OF_FRAMES.iter().filter_map(|name| of_frames(runs, name)).collect();
+fn values(runs: &[Value; 2]) -> Vec<ValueChange> {
+    let mut values: Vec<ValueChange> = OF_FRAMES.iter().filter_map(|name| of_frames(runs, name)).collect();
     for (key, group, unit) in GROUPS {
         for (name, pair) in leaves(key, [&runs[0][key], &runs[1][key]]) {
             let name = name.strip_prefix(key).map_or(name.as_str(), |rest| rest.trim_start_matches('.'));
@@ -225,7 +225,7 @@ fn values(runs: &[Value; 2]) -> Vec<Change> {
             let numbers = pair.map(Value::as_f64);
             if numbers.iter().any(Option::is_some) {
                 let unit = if unit.is_empty() { unit_of(name) } else { unit };
-                values.push(Change::new(group, name, unit, numbers));
+                values.push(ValueChange::new(group, name, unit, numbers));
             }
         }
     }
@@ -233,7 +233,7 @@ fn values(runs: &[Value; 2]) -> Vec<Change> {
 }
 
 /// Mean over frames of the number `name`.
-fn of_frames(runs: &[Value; 2], name: &str) -> Option<Change> {
+fn of_frames(runs: &[Value; 2], name: &str) -> Option<ValueChange> {
     let mean = |run: &Value| {
         let numbers: Option<Vec<f64>> =
             run["frames"].as_array()?.iter().map(|frame| frame[name].as_f64()).collect();
@@ -242,7 +242,7 @@ fn of_frames(runs: &[Value; 2], name: &str) -> Option<Change> {
     };
     let means = [mean(&runs[0]), mean(&runs[1])];
     let known = means.iter().any(Option::is_some);
-    known.then(|| Change::new("mean of a frame", name, unit_of(name), means))
+    known.then(|| ValueChange::new("mean of a frame", name, unit_of(name), means))
 }
 
 /// Unit from the ending of a name, or of a part of its path.
@@ -278,12 +278,12 @@ const ROUNDING: f64 = 1e-13;
 
 /// Value of a quantity in A and in B.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Change {
+pub struct ValueChange {
     /// Group of the quantity.
     pub group: String,
-    /// Its name.
+    /// Name of the number.
     pub name: String,
-    /// Its unit; empty for counts and shares.
+    /// Unit of the number; empty for counts and shares.
     pub unit: String,
     /// Value in A, if present.
     pub a: Option<f64>,
@@ -295,7 +295,7 @@ pub struct Change {
     pub ratio: Option<f64>,
 }
 
-impl Change {
+impl ValueChange {
     /// The change from `a` to `b`.
     pub fn new(group: &str, name: &str, unit: &str, [a, b]: [Option<f64>; 2]) -> Self {
         let both = a.zip(b);
@@ -323,7 +323,7 @@ pub struct TableComparison {
     /// The files.
     pub files: [String; 2],
     /// Number of frames, and mean and standard deviation of each column.
-    pub values: Vec<Change>,
+    pub values: Vec<ValueChange>,
 }
 
 /// Columns of `frames.csv` that are compared, with their units.
@@ -340,7 +340,7 @@ const COLUMNS: [(&str, &str); 6] = [
 pub(super) fn compare_tables(a: &Path, b: &Path) -> Result<TableComparison, CompareError> {
     let [one, other] = [read_table(a)?, read_table(b)?];
     let frames = [&one, &other].map(|table| table.values().map(Vec::len).max().map(|count| count as f64));
-    let mut values = vec![Change::new("frames", "frames", "", frames)];
+    let mut values = vec![ValueChange::new("frames", "frames", "", frames)];
     for (column, unit) in COLUMNS {
         let numbers = [&one, &other].map(|table| table.get(column).filter(|column| !column.is_empty()));
         if numbers.iter().all(Option::is_none) {
@@ -348,9 +348,9 @@ pub(super) fn compare_tables(a: &Path, b: &Path) -> Result<TableComparison, Comp
         }
         let spreads = numbers.map(|numbers| numbers.and_then(|numbers| Spread::of(numbers)));
         let means = spreads.map(|spread| spread.map(|spread| spread.mean));
-        values.push(Change::new("mean over frames", column, unit, means));
+        values.push(ValueChange::new("mean over frames", column, unit, means));
         let deviations = spreads.map(|spread| spread.map(|spread| spread.deviation));
-        values.push(Change::new("standard deviation", column, unit, deviations));
+        values.push(ValueChange::new("standard deviation", column, unit, deviations));
     }
     Ok(TableComparison { files: [a, b].map(|path| path.display().to_string()), values })
 }
@@ -408,7 +408,10 @@ mod tests {
     fn settings_have_paths_and_numbers_have_units() {
         let runs = [run("a", 4, 2.0), run("a", 8, 3.0)];
         let differ = settings(&runs);
-        assert_eq!(differ, [Setting { name: "settings.samples".to_owned(), a: json!(4), b: json!(8) }]);
+        assert_eq!(
+            differ,
+            [ComparedSetting { name: "settings.samples".to_owned(), a: json!(4), b: json!(8) }]
+        );
         let values = values(&runs);
         let energy = values.iter().find(|change| change.name == "energy_j.mean").unwrap();
         assert_eq!((energy.unit.as_str(), energy.difference, energy.ratio), ("J", Some(1.0), Some(1.5)));
@@ -440,8 +443,11 @@ mod tests {
         runs[1]["request"] =
             json!({"options": {"file": null, "set": [["method", "forward"], ["lights", "3"]]}});
         let differ = settings(&runs);
-        let options =
-            Setting { name: "options".to_owned(), a: Value::Null, b: json!("method=forward lights=3") };
+        let options = ComparedSetting {
+            name: "options".to_owned(),
+            a: Value::Null,
+            b: json!("method=forward lights=3"),
+        };
         assert_eq!(differ, [options]);
     }
 
@@ -473,12 +479,12 @@ mod tests {
 
     #[test]
     fn a_change_has_a_sign_and_a_ratio() {
-        let change = Change::new("g", "n", "J", [Some(2.0), Some(1.5)]);
+        let change = ValueChange::new("g", "n", "J", [Some(2.0), Some(1.5)]);
         assert_eq!((change.difference, change.ratio), (Some(-0.5), Some(0.75)));
-        assert_eq!(Change::new("g", "n", "J", [Some(0.0), Some(1.0)]).ratio, None);
-        assert!(Change::new("g", "n", "J", [Some(0.1 + 0.2), Some(0.3)]).is_equal());
-        assert!(!Change::new("g", "n", "J", [Some(1.0), Some(1.0 + 1e-9)]).is_equal());
-        let missing = Change::new("g", "n", "J", [None, Some(1.0)]);
+        assert_eq!(ValueChange::new("g", "n", "J", [Some(0.0), Some(1.0)]).ratio, None);
+        assert!(ValueChange::new("g", "n", "J", [Some(0.1 + 0.2), Some(0.3)]).is_equal());
+        assert!(!ValueChange::new("g", "n", "J", [Some(1.0), Some(1.0 + 1e-9)]).is_equal());
+        let missing = ValueChange::new("g", "n", "J", [None, Some(1.0)]);
         assert!(!missing.is_equal() && missing.difference.is_none());
     }
 

@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 
 use activity::{Counts, Event};
 use output::table::si;
-use power_model::{PacedFrame, Run};
+use power_model::{PacedFrame, PacedRun};
 use timing::AccuracyWarning;
 use traces::frames::Flag;
 use warnings::{Code, Warning};
@@ -34,7 +34,7 @@ pub(crate) fn gather(plan: &Plan, simulated: &Simulated, measurement: &Measureme
 }
 
 /// Warnings of a run but for those about its recorded trace, sorted, without duplicates.
-pub fn warnings_of(plan: &Plan, simulated: &Simulated, paced: &Run) -> Vec<Warning> {
+pub fn warnings_of(plan: &Plan, simulated: &Simulated, paced: &PacedRun) -> Vec<Warning> {
     let mut all = plan.job.warnings().to_vec();
     all.extend(plan.pairing.clone());
     all.extend(of_frames(
@@ -335,7 +335,7 @@ fn lost(measurement: &Measurement) -> Option<Warning> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{GpuSpec, HeatQuantity, Quantity, SampledSummary};
+    use crate::{GpuSpec, HeatQuantity, RunQuantity, SampledSummary};
     use timing::streams::failures;
     use timing::{FrameClock, Level, Recorder};
 
@@ -388,7 +388,7 @@ mod tests {
         let of = |percent: f64| {
             let relative_half_width = percent / 100.0;
             let quantity =
-                |relative_half_width| Quantity { value: 1.0, low: 0.9, high: 1.1, relative_half_width };
+                |relative_half_width| RunQuantity { value: 1.0, low: 0.9, high: 1.1, relative_half_width };
             let sampled = SampledSummary {
                 simulated_frames: vec![0, 7, 30],
                 frames_per_simulated: 12.0,
@@ -455,8 +455,8 @@ mod tests {
     #[test]
     fn a_level_that_was_chosen_is_not_to_be_chosen_again() {
         let message = |chosen| AccuracyWarning::MemoryRows(0.5).warning(3, Level::Packet, chosen).message;
-        let (asked, chosen) = (message(None), message(Some(0.012)));
-        assert!(asked.ends_with("use --timing stepped, or let --accuracy choose"), "{asked}");
+        let (requested, chosen) = (message(None), message(Some(0.012)));
+        assert!(requested.ends_with("use --timing stepped, or let --accuracy choose"), "{requested}");
         let remedy = "`packet` was chosen with an error of 1.20 % on a probe; give a smaller --accuracy, or --timing stepped";
         assert!(chosen.ends_with(remedy), "{chosen}");
     }

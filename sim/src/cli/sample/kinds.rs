@@ -11,11 +11,13 @@ use workloads::points::poisson::{
     Domain, PoissonDisk, PoissonSpec, Spacing, ball, poisson_disk_with_progress, radius_for, saturation, span,
 };
 use workloads::points::thin_regions_warning;
-use workloads::points::volume::{Bounds, Inside, Sampled, Solid, Torus};
-use workloads::points::white::{Density, ImageDensity, Named, Numbers, WhiteSpec, columns_for, white_noise};
+use workloads::points::volume::{Inside, Sampled, Solid, SolidBounds, Torus};
+use workloads::points::white::{
+    Density, ImageDensity, NamedDensity, Numbers, WhiteSpec, columns_for, white_noise,
+};
 use workloads::visibility::load_surface;
 
-use super::{Common, Failure, Points, usage};
+use super::{CommonArgs, Failure, Points, usage};
 
 /// Arguments of `sample poisson`.
 #[derive(Debug, Args)]
@@ -35,7 +37,7 @@ pub struct PoissonArgs {
     #[arg(long = "box")]
     pub boxed: bool,
     #[command(flatten)]
-    pub common: Common,
+    pub common: CommonArgs,
 }
 
 impl PoissonArgs {
@@ -191,7 +193,7 @@ pub struct VolumeArgs {
     #[arg(long, value_name = "N", default_value_t = 64, allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..=2048))]
     pub tiles: u32,
     #[command(flatten)]
-    pub common: Common,
+    pub common: CommonArgs,
 }
 
 impl VolumeArgs {
@@ -255,7 +257,12 @@ fn thick_enough(args: &VolumeArgs, share: f64) -> Result<(), Failure> {
     )))
 }
 
-fn sample_volume(args: &VolumeArgs, solid: &dyn Inside, bounds: &Bounds, volume: f64) -> Result<(), Failure> {
+fn sample_volume(
+    args: &VolumeArgs,
+    solid: &dyn Inside,
+    bounds: &SolidBounds,
+    volume: f64,
+) -> Result<(), Failure> {
     let seed = args.common.seed;
     let count = args.points() as usize;
     let Sampled { points, candidates } = match args.density {
@@ -289,7 +296,7 @@ pub struct WhiteArgs {
     pub count: u32,
     /// The density: constant, ramp, gauss or waves
     #[arg(long, value_name = "NAME", default_value = "gauss", value_parser = density, conflicts_with = "image")]
-    pub density: Named,
+    pub density: NamedDensity,
     /// A PNG or JPEG image as a density in two dimensions: bright is dense
     #[arg(long, value_name = "FILE")]
     pub image: Option<PathBuf>,
@@ -300,12 +307,13 @@ pub struct WhiteArgs {
     #[arg(long)]
     pub low_discrepancy: bool,
     #[command(flatten)]
-    pub common: Common,
+    pub common: CommonArgs,
 }
 
-fn density(name: &str) -> Result<Named, String> {
-    let known = Named::ALL.map(|(name, _)| name);
-    Named::by_name(name).ok_or_else(|| format!("unknown density `{name}`; {}", suggestion(name, &known)))
+fn density(name: &str) -> Result<NamedDensity, String> {
+    let known = NamedDensity::ALL.map(|(name, _)| name);
+    NamedDensity::by_name(name)
+        .ok_or_else(|| format!("unknown density `{name}`; {}", suggestion(name, &known)))
 }
 
 /// WhiteFacts about the points.

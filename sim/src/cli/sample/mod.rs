@@ -43,7 +43,7 @@ pub enum Kind {
 
 /// Arguments of all distributions.
 #[derive(Debug, Args)]
-pub struct Common {
+pub struct CommonArgs {
     /// Seed of the points
     #[arg(long, value_name = "N", default_value_t = 1, allow_negative_numbers = true, value_parser = crate::cli::parse::seed)]
     pub seed: u64,
@@ -71,7 +71,7 @@ struct Made<T: Serialize> {
     facts: T,
 }
 
-impl Common {
+impl CommonArgs {
     /// Writes the file and prints the result.
     fn deliver(&self, points: &Points, facts: impl Serialize, line: &str) -> Result<(), Failure> {
         let pool = self.threads.pool()?;

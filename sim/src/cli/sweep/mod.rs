@@ -10,8 +10,8 @@ use rayon::ThreadPool;
 use run::Input;
 use serde::Serialize;
 use sweep::{
-    Answer, Expected, Folder, Question, RatedDesign, ReportOptions, Scripts, Search, Shard, SlurmArray,
-    SlurmJob, Status, SweepPlan, SweepReport, Work, merge, submit,
+    Answer, ExpectedRuns, Folder, Question, RatedDesign, ReportOptions, Scripts, Search, Shard, ShardWork,
+    SlurmArray, SlurmJob, Status, SweepPlan, SweepReport, merge, submit,
 };
 
 use self::args::{
@@ -65,8 +65,8 @@ impl Opened {
     }
 
     /// Expected time of all points that are not finished, by running two of them.
-    fn probe(&self, shard: Shard, retry: bool) -> Result<Expected, Failure> {
-        let work = Work::new(&self.plan, &self.folder, shard, retry)?;
+    fn probe(&self, shard: Shard, retry: bool) -> Result<ExpectedRuns, Failure> {
+        let work = ShardWork::new(&self.plan, &self.folder, shard, retry)?;
         self.progress.note(&format!(
             "{} planned; running two for the expected time",
             counted(self.plan.points.len(), "run")
@@ -98,8 +98,8 @@ fn run_points(args: &RunStepArgs, terminal: &Terminal, stop: &Stop) -> Result<()
     }
     let Opened { plan, folder, pool, progress } = opened;
     folder.write_plan(&plan)?;
-    let is_asked = || stop.is_asked();
-    let work = Work::new(&plan, &folder, shard, args.retry)?.until(&is_asked);
+    let is_requested = || stop.is_requested();
+    let work = ShardWork::new(&plan, &folder, shard, args.retry)?.until(&is_requested);
     let status = pool.install(|| work.run(&progress))?;
     print_status(
         &args.sweep.out,
@@ -250,7 +250,7 @@ fn merged(args: &MergeArgs, terminal: &Terminal) -> Result<(), Failure> {
     }
 }
 
-fn print_expected(args: &FileArgs, expected: &Expected) -> Result<(), Failure> {
+fn print_expected(args: &FileArgs, expected: &ExpectedRuns) -> Result<(), Failure> {
     match args.json {
         true => print_json(&Printed { out: args.out.display().to_string(), done: expected }, true),
         false => print(&expected.line()),

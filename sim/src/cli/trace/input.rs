@@ -17,7 +17,7 @@ use traces::io::{
     FORMATS, ReadOptions, Repair, Rows, TraceFile, TraceFormat, TraceReader, open, rail_of_sums, read,
     readable, unread_power_ratio,
 };
-use traces::search::{FrameSet, Search};
+use traces::search::{FrameSearch, FrameSet};
 use traces::times::read_times;
 use traces::trace::RATE_LIMITS_HZ;
 use warnings::{Code, Warning};
@@ -321,12 +321,12 @@ impl FindArgs {
         Ok(self.search()?.of_trace(trace)?)
     }
 
-    fn search(&self) -> Result<Search, Failure> {
+    fn search(&self) -> Result<FrameSearch, Failure> {
         let mut starts_s = self.mark.clone();
         if let Some(path) = &self.mark_file {
             starts_s.extend(read_times(path)?);
         }
-        Ok(Search {
+        Ok(FrameSearch {
             starts_s,
             propose: self.auto,
             window: self.window.map(|(pre_s, post_s)| Window { pre_s, post_s }),
@@ -338,7 +338,7 @@ impl FindArgs {
 }
 
 fn in_pieces(
-    search: &Search,
+    search: &FrameSearch,
     input: &InputArgs,
     path: &Path,
     terminal: &Terminal,

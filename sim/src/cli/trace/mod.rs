@@ -52,7 +52,7 @@ pub enum TraceCommand {
     /// Read a trace and write it in another format
     Convert(ConvertArgs),
     /// Record a trace anew with a coarser device: rate, range, bits, errors, noise
-    Sample(Box<SampleArgs>),
+    Sample(Box<TraceSampleArgs>),
     /// Draw a trace or its frames
     Plot(Box<PlotArgs>),
     /// Pareto-optimal settings of a table, by time and energy
@@ -262,7 +262,7 @@ fn save(trace: &dyn TraceReader, path: &Path, terminal: &Terminal) -> Result<(),
     Without --device the recorder has the defaults above and a range that fits the trace. Options with a unit take a number in that \
     unit, or with any unit of its kind: 1kHz, 20us, 5mV, 250mA, 4mOhm."
 )]
-pub struct SampleArgs {
+pub struct TraceSampleArgs {
     /// The trace.
     #[command(flatten)]
     pub input: InputArgs,
@@ -333,7 +333,7 @@ pub struct SampleArgs {
     pub format: Option<&'static TraceFormat>,
 }
 
-fn sample(args: &SampleArgs, piped: bool, terminal: &Terminal) -> Result<(), Failure> {
+fn sample(args: &TraceSampleArgs, piped: bool, terminal: &Terminal) -> Result<(), Failure> {
     let format = format_of(&args.out)?;
     let inputs = args.device.as_deref().into_iter().chain([args.input.trace.as_path()]);
     may_be_saved("--out", &args.out, format, inputs)?;
@@ -388,7 +388,7 @@ fn sample(args: &SampleArgs, piped: bool, terminal: &Terminal) -> Result<(), Fai
     report(&line, piped, terminal)
 }
 
-impl SampleArgs {
+impl TraceSampleArgs {
     /// The device: that of the file, or the default one with a range that fits and no more samples than the
     /// trace has; and what options change of it.
     fn spec(&self, peaks: &Peaks, trace_rate_hz: f64) -> Result<DeviceSpec, Failure> {
@@ -429,7 +429,7 @@ impl SampleArgs {
 
     /// Puts the options that are given into `spec`; ranges are there already.
     fn change(&self, spec: &mut DeviceSpec) {
-        let set = |field: &mut f64, asked: Option<f64>| *field = asked.unwrap_or(*field);
+        let set = |field: &mut f64, given: Option<f64>| *field = given.unwrap_or(*field);
         set(&mut spec.rate_hz, self.device_rate);
         set(&mut spec.rail_v, self.rail_voltage);
         set(&mut spec.rail_ohm, self.rail_ohm);

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
-use output::plot::{AxisSpec, Chart, ChartPanel, Mark, Paint, Picture, Scale, Series};
+use output::plot::{AxisSpec, Chart, ChartPanel, Paint, Picture, PlotMark, Scale, Series};
 use output::table::{Table, counted, si, si_digits};
 use output::terminal::Terminal;
 use serde_json::json;
@@ -13,8 +13,8 @@ use traces::Trace;
 use traces::energy::{FrameEnergy, Histogram, Repeats, mean_over_discarded, whole};
 use traces::io::atomic::write_file;
 use traces::io::{ReadError, ReadOptions};
-use traces::pareto::{Point, RatedPoint, SettingColumns, frontiers, write_csv};
-use traces::pyramid::{Column, Pyramid, moving_means_w, pyramid_path};
+use traces::pareto::{ParetoPoint, RatedPoint, SettingColumns, frontiers, write_csv};
+use traces::pyramid::{Column, PowerPyramid, moving_means_w, pyramid_path};
 use traces::table::InputTable;
 use traces::trace::check_span;
 
@@ -122,7 +122,7 @@ fn span(args: &PlotArgs, start_s: f64, end_s: f64) -> Result<[f64; 2], Failure> 
     Ok([from_s.max(start_s), to_s.min(end_s)])
 }
 
-type Make = fn(&Path, &ReadOptions) -> Result<Pyramid, ReadError>;
+type Make = fn(&Path, &ReadOptions) -> Result<PowerPyramid, ReadError>;
 
 /// The shown time and its columns: from the pyramid beside the file, or from the samples where these are few.
 fn columns(args: &PlotArgs, terminal: &Terminal) -> Result<([f64; 2], Vec<Column>), Failure> {
@@ -130,14 +130,14 @@ fn columns(args: &PlotArgs, terminal: &Terminal) -> Result<([f64; 2], Vec<Column
         // Repairs are listed, so they are made anew each time.
         let trace = args.input.load(terminal)?.0;
         let shown = span(args, trace.start_s(), trace.end_s())?;
-        let columns = Pyramid::of_trace(&trace).columns_of_trace(&trace, shown, COLUMNS);
+        let columns = PowerPyramid::of_trace(&trace).columns_of_trace(&trace, shown, COLUMNS);
         return Ok((shown, columns.unwrap_or_default()));
     }
     let (path, options) = (args.input.trace.as_path(), args.input.options()?);
     args.input.warn_of_columns(path, terminal)?;
     let (pyramid, make): (_, Make) = match args.keep_pyramid {
-        true => (Pyramid::of_file(path, &options)?, Pyramid::anew),
-        false => (Pyramid::look(path, &options)?, Pyramid::build),
+        true => (PowerPyramid::of_file(path, &options)?, PowerPyramid::anew),
+        false => (PowerPyramid::look(path, &options)?, PowerPyramid::build),
     };
     let note = || terminal.note(&format!("{}: damaged; made anew", pyramid_path(path).display()));
     if pyramid.was_damaged() {
@@ -162,8 +162,8 @@ fn curve(args: &PlotArgs, terminal: &Terminal) -> Result<(Picture, String), Fail
         moving_means_w(&columns, width_s).into_iter().zip(&columns).map(|(w, c)| (middle(c), w)).collect();
     let shown = format!("{from_s} s to {to_s} s in {} columns", columns.len());
     let series = vec![
-        series("lowest to highest", Mark::Band(band)),
-        series(&format!("mean over {}", si(width_s, "s")), Mark::Line(mean)),
+        series("lowest to highest", PlotMark::Band(band)),
+        series(&format!("mean over {}", si(width_s, "s")), PlotMark::Line(mean)),
     ];
     let subject = name_of(&args.input.trace);
     Ok((drawn(args, &subject, ("Power", ("time", "s"), POWER, series)), shown))
@@ -224,7 +224,7 @@ fn energies(args: &PlotArgs, terminal: &Terminal) -> Result<(usize, Drawn), Fail
                 "Mean energy over discarded frames",
                 ("frames discarded", ""),
                 ("energy", "J"),
-                vec![series("mean of the rest", Mark::Line(line))],
+                vec![series("mean of the rest", PlotMark::Line(line))],
             )
         }
         PlotKind::Repeats => repeats(args, &energies, terminal)?,
@@ -232,7 +232,7 @@ fn energies(args: &PlotArgs, terminal: &Terminal) -> Result<(usize, Drawn), Fail
             let out = traces::energy::outliers(&energies);
             let of = |odd: bool| {
                 let chosen = energies.iter().enumerate().filter(|(index, _)| out[*index] == odd);
-                Mark::Dots(chosen.map(|(index, j)| (index as f64, *j, String::new())).collect())
+                PlotMark::Dots(chosen.map(|(index, j)| (index as f64, *j, String::new())).collect())
             };
             let series = vec![series("frame", of(false)), series("outlier", of(true))];
             ("Energy per frame", ("frame", ""), ("energy", "J"), series)
@@ -246,7 +246,7 @@ type Drawn = (&'static str, (&'static str, &'static str), (&'static str, &'stati
 /// The vertical axis of power.
 const POWER: (&str, &str) = ("power", "W");
 
-fn series(name: &str, mark: Mark) -> Series {
+fn series(name: &str, mark: PlotMark) -> Series {
     Series::new(name, mark)
 }
 
@@ -280,9 +280,9 @@ fn one_frame(args: &PlotArgs, trace: &Trace, frames: &[FrameEnergy]) -> Result<D
         ("time since its start", "s"),
         POWER,
         vec![
-            series("before and after it", Mark::Faint(beside.into())).painted(Paint::Grey),
-            series(&name, Mark::Line(within(trace, frame))).painted(Paint::Like(0)),
-            series("start and end", Mark::Uprights(vec![0.0, frame.end_s - frame.start_s]))
+            series("before and after it", PlotMark::Faint(beside.into())).painted(Paint::Grey),
+            series(&name, PlotMark::Line(within(trace, frame))).painted(Paint::Like(0)),
+            series("start and end", PlotMark::Uprights(vec![0.0, frame.end_s - frame.start_s]))
                 .painted(Paint::Ink),
         ],
     ))
@@ -296,7 +296,7 @@ fn overlay(trace: &Trace, frames: &[FrameEnergy]) -> Drawn {
         "Frames on top of one another",
         ("time since the start", "s"),
         POWER,
-        vec![series(&name, Mark::Faint(lines))],
+        vec![series(&name, PlotMark::Faint(lines))],
     )
 }
 
@@ -307,7 +307,7 @@ fn histogram(energies: &[f64]) -> Drawn {
         "Distribution of frame energies",
         ("energy", "J"),
         ("frames", ""),
-        vec![series("frames", Mark::Bars(bars))],
+        vec![series("frames", PlotMark::Bars(bars))],
     )
 }
 
@@ -333,7 +333,7 @@ fn repeats(args: &PlotArgs, first: &[f64], terminal: &Terminal) -> Result<Drawn,
         "Energy of each frame over repeated runs",
         ("frame", ""),
         ("energy", "J"),
-        vec![series(&name, Mark::Band(band)), series("mean", Mark::Line(mean))],
+        vec![series(&name, PlotMark::Band(band)), series("mean", PlotMark::Line(mean))],
     ))
 }
 
@@ -452,7 +452,7 @@ fn text(groups: &Groups) -> String {
 }
 
 /// Where a setting stands in the plot, and its deviations.
-fn place(show: ParetoShow, p: &Point) -> (f64, f64, f64, f64) {
+fn place(show: ParetoShow, p: &ParetoPoint) -> (f64, f64, f64, f64) {
     match show {
         ParetoShow::Energy => (p.time_s, p.energy_j, p.time_deviation_s, p.energy_deviation_j),
         ParetoShow::Power => (p.time_s, p.power_w(), p.time_deviation_s, p.power_deviation_w()),
@@ -472,7 +472,7 @@ fn picture(subject: &str, show: ParetoShow, plot_style: &PlotStyleArgs, groups: 
     let crosses: Vec<_> = all().map(place).filter(|(_, _, dx, dy)| *dx > 0.0 || *dy > 0.0).collect();
     for (x, y, dx, dy) in &crosses {
         let lines = vec![vec![(x - dx, *y), (x + dx, *y)], vec![(*x, y - dy), (*x, y + dy)]];
-        series.push(Series::new("", Mark::Faint(lines)).painted(Paint::Ink));
+        series.push(Series::new("", PlotMark::Faint(lines)).painted(Paint::Ink));
     }
     if let Some(first) = series.first_mut() {
         first.name = "one standard deviation".to_owned();
@@ -483,11 +483,11 @@ fn picture(subject: &str, show: ParetoShow, plot_style: &PlotStyleArgs, groups: 
         steps.sort_by(|a, b| a.0.total_cmp(&b.0));
         if steps.len() > 1 {
             let name = if group.is_empty() { "frontier".to_owned() } else { group.clone() };
-            series.push(Series::new(name, Mark::Steps(steps)).painted(Paint::Like(2 + number % 6)));
+            series.push(Series::new(name, PlotMark::Steps(steps)).painted(Paint::Like(2 + number % 6)));
         }
     }
-    series.push(Series::new("dominated", Mark::Rings(of(false))).painted(Paint::Like(0)));
-    series.push(Series::new("on the frontier", Mark::Dots(of(true))).painted(Paint::Like(0)));
+    series.push(Series::new("dominated", PlotMark::Rings(of(false))).painted(Paint::Like(0)));
+    series.push(Series::new("on the frontier", PlotMark::Dots(of(true))).painted(Paint::Like(0)));
     let (title, y) = match show {
         ParetoShow::Energy => ("Time and energy", ("energy", "J")),
         ParetoShow::Power => ("Time and mean power", ("power", "W")),

@@ -44,8 +44,8 @@ pub struct Cost {
 
 /// A design of a workload.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Design {
-    /// Its settings in short.
+pub struct SweepDesign {
+    /// Settings of the design in short.
     pub design: String,
     /// Settings of the hardware that vary, by path.
     pub settings: BTreeMap<String, String>,
@@ -63,7 +63,7 @@ pub struct Design {
     pub warnings: Vec<String>,
 }
 
-impl Design {
+impl SweepDesign {
     /// Whether platform and energy table are not those of its GPU, so that its energy is less certain than stated.
     pub fn is_mismatched(&self) -> bool {
         self.warnings.iter().any(|code| code == "platform-mismatch")
@@ -121,7 +121,7 @@ pub(crate) fn short_names(plan: &SweepPlan) -> BTreeMap<&str, &str> {
 }
 
 /// Designs in order of first use, with means and standard deviations over their runs.
-pub(crate) fn designs(rows: &[Row<'_>]) -> Vec<Design> {
+pub(crate) fn designs(rows: &[Row<'_>]) -> Vec<SweepDesign> {
     let mut places: HashMap<&str, usize> = HashMap::new();
     let mut runs: Vec<Vec<&Row<'_>>> = Vec::new();
     for row in rows {
@@ -134,7 +134,7 @@ pub(crate) fn designs(rows: &[Row<'_>]) -> Vec<Design> {
     runs.iter().filter_map(|runs| mean(runs)).collect()
 }
 
-fn mean(runs: &[&Row<'_>]) -> Option<Design> {
+fn mean(runs: &[&Row<'_>]) -> Option<SweepDesign> {
     let of = |value: &dyn Fn(&Row<'_>) -> f64| MeanSd::of(runs.iter().map(|row| value(row)));
     // The largest error of the runs.
     let error = |of: fn(&Row<'_>) -> f64| runs.iter().map(|row| of(row)).fold(0.0, f64::max);
@@ -147,7 +147,7 @@ fn mean(runs: &[&Row<'_>]) -> Option<Design> {
     let first = runs.first()?;
     let codes = runs.iter().flat_map(|run| run.warnings.split(',')).filter(|code| !code.is_empty());
     let codes: BTreeSet<&str> = codes.collect();
-    Some(Design {
+    Some(SweepDesign {
         design: first.design.clone(),
         settings: texts(&first.settings),
         conditions: texts(&first.conditions),

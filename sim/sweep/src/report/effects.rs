@@ -11,7 +11,7 @@ use std::collections::HashMap;
 use serde::Serialize;
 use timing::sampled::student_t;
 
-use super::design::{Design, Factor, cells, codes, factors};
+use super::design::{Factor, SweepDesign, cells, codes, factors};
 
 /// Most values of a setting that have effects of their own: of more, a value is in too few points.
 const MAX_VALUES: usize = 20;
@@ -35,7 +35,7 @@ pub struct Effect {
     pub workload: String,
     /// The setting; linked settings are one, with ` + `.
     pub setting: String,
-    /// Its value, or the first and the last of a group of values.
+    /// Value of the setting, or the first and the last of a group of values.
     pub value: String,
     /// Designs with this value.
     pub points: usize,
@@ -60,11 +60,11 @@ pub struct Interaction {
     pub workload: String,
     /// First setting.
     pub setting: String,
-    /// Its value.
+    /// Value of the setting.
     pub value: String,
     /// Second setting.
     pub with_setting: String,
-    /// Its value.
+    /// Value of the other setting.
     pub with_value: String,
     /// Designs with both values.
     pub points: usize,
@@ -148,8 +148,8 @@ pub(crate) struct Factorial {
 
 impl Factorial {
     /// Designs by the settings of the hardware, and with `conditions` by those of the work.
-    pub fn new(workload: &str, designs: &[&Design], conditions: bool) -> Self {
-        let settings = |design: &Design| {
+    pub fn new(workload: &str, designs: &[&SweepDesign], conditions: bool) -> Self {
+        let settings = |design: &SweepDesign| {
             let work = design.conditions.clone().into_iter().filter(|_| conditions);
             design.settings.clone().into_iter().chain(work).collect::<Vec<_>>()
         };
@@ -170,7 +170,7 @@ impl Factorial {
             grouped
         };
         let factors: Vec<Factor> = all.into_iter().filter_map(with_effects).collect();
-        let logs = |of: fn(&Design) -> f64| designs.iter().map(|design| libm::log(of(design))).collect();
+        let logs = |of: fn(&SweepDesign) -> f64| designs.iter().map(|design| libm::log(of(design))).collect();
         let time = Additive::fitted(logs(|design| design.time_s.value), &factors);
         let energy = Additive::fitted(logs(|design| design.energy_j.value), &factors);
         Self { workload: workload.to_owned(), factors, time, energy, is_whole, no_effects }
@@ -347,7 +347,7 @@ mod tests {
     use traces::stats::Random;
 
     /// Designs over x, y and z, with the logarithm of time by `log`.
-    fn grid(count: usize, log: impl Fn(usize, usize, usize) -> f64) -> Vec<Design> {
+    fn grid(count: usize, log: impl Fn(usize, usize, usize) -> f64) -> Vec<SweepDesign> {
         let mut designs = Vec::new();
         for (x, y) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
             for z in 0..count {
@@ -359,7 +359,7 @@ mod tests {
         designs
     }
 
-    fn factorial(designs: &[Design]) -> Factorial {
+    fn factorial(designs: &[SweepDesign]) -> Factorial {
         Factorial::new("w", &designs.iter().collect::<Vec<_>>(), false)
     }
 
@@ -414,7 +414,7 @@ mod tests {
     #[test]
     fn settings_of_many_values_have_effects_of_groups() {
         // The logarithm of time rises by 1 over the range; quarters are 1/4 apart.
-        let of = |count: usize, name: &dyn Fn(usize) -> String| -> Vec<Design> {
+        let of = |count: usize, name: &dyn Fn(usize) -> String| -> Vec<SweepDesign> {
             // Not in the order of their values.
             let design = |n: usize| {
                 let n = n * 7 % count;

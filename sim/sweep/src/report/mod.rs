@@ -1,7 +1,7 @@
 //! What a sweep found: frontiers, winners, effects, and the confidence in all of that.
 //!
 //! ```text
-//! results -> Row -> Design (runs that differ in their seed are one) -> frontier, ranks, winners, effects -> SweepReport -> files, page
+//! results -> Row -> SweepDesign (runs that differ in their seed are one) -> frontier, ranks, winners, effects -> SweepReport -> files, page
 //! ```
 
 mod design;
@@ -19,7 +19,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 pub(crate) use design::label;
-pub use design::{Cost, Design};
+pub use design::{Cost, SweepDesign};
 pub use effects::{Effect, Interaction, NoEffect, Share};
 pub use order::RatedDesign;
 pub use winners::{Measure, NearBest, Pair, Winner};
@@ -71,10 +71,10 @@ pub struct SweepReport {
     /// Settings that vary and have no effects, or effects of groups of their values alone.
     pub no_effects: Vec<NoEffect>,
     /// Points that failed, were screened out or are undecided.
-    pub failed: Vec<Failure>,
+    pub failed: Vec<PointFailure>,
     /// Points that are left out; the sum of the next four.
     pub left_out: usize,
-    /// Of these, points that failed.
+    /// Points left out that failed.
     pub left_out_failed: usize,
     /// Points that a coarser timing level left out.
     pub left_out_screened: usize,
@@ -88,8 +88,8 @@ pub struct SweepReport {
 
 /// A point that failed, was screened out or is undecided.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Failure {
-    /// Its settings.
+pub struct PointFailure {
+    /// Settings of the point.
     pub settings: String,
     /// Why.
     pub reason: String,
@@ -113,7 +113,7 @@ impl SweepReport {
         // With screening, designs are compared at the last level.
         let same = if plan.screen.is_empty() { &["seed"][..] } else { &["seed", "timing"] };
         let points = plan.last_level();
-        let failure = |point: &Point, outcome: Outcome| Failure {
+        let failure = |point: &Point, outcome: Outcome| PointFailure {
             settings: label(&point.settings, &names),
             screened_out: matches!(outcome, Outcome::ScreenedOut(_)),
             undecided: matches!(outcome, Outcome::Undecided(_)),
@@ -136,7 +136,7 @@ impl SweepReport {
             }
         }
         let left_out = points.len() - rows.len();
-        let count = |is: fn(&Failure) -> bool| failed.iter().filter(|failure| is(failure)).count();
+        let count = |is: fn(&PointFailure) -> bool| failed.iter().filter(|failure| is(failure)).count();
         let left_out_screened = count(|failure| failure.screened_out);
         let left_out_undecided = count(|failure| failure.undecided);
         let of_rows = Self::of_rows(rows, options);
@@ -209,10 +209,10 @@ impl SweepReport {
     }
 
     /// Report of designs by workload.
-    fn of_designs(by_workload: BTreeMap<String, Vec<Design>>, options: ReportOptions) -> Self {
+    fn of_designs(by_workload: BTreeMap<String, Vec<SweepDesign>>, options: ReportOptions) -> Self {
         let mut report = Self { within: options.within, ..Self::default() };
         if by_workload.len() > 1 {
-            let all: Vec<&Design> = by_workload.values().flatten().collect();
+            let all: Vec<&SweepDesign> = by_workload.values().flatten().collect();
             report.add_effects(ALL_WORKLOADS, &all, true);
         }
         for (workload, designs) in by_workload {
@@ -226,7 +226,7 @@ impl SweepReport {
     }
 
     /// Adds effects of the settings of designs, and with `conditions` those of the work.
-    fn add_effects(&mut self, workload: &str, designs: &[&Design], conditions: bool) {
+    fn add_effects(&mut self, workload: &str, designs: &[&SweepDesign], conditions: bool) {
         let found = effects::Factorial::new(workload, designs, conditions);
         self.effects.extend(found.effects());
         self.interactions.extend(found.interactions());
@@ -237,12 +237,12 @@ impl SweepReport {
 
 /// Costs of designs with these times and energies, for tests: exact, with equal ends of the energy table.
 #[cfg(test)]
-pub(crate) fn exact(settings: &[(&str, &str)], time_s: f64, energy_j: f64) -> Design {
+pub(crate) fn exact(settings: &[(&str, &str)], time_s: f64, energy_j: f64) -> SweepDesign {
     let cost = |value| Cost { value, deviation: 0.0, error: 0.0, low: value, high: value };
     let settings: BTreeMap<String, String> =
         settings.iter().map(|(path, value)| ((*path).to_owned(), (*value).to_owned())).collect();
     let label = settings.iter().map(|(path, value)| format!("{path}={value}")).collect::<Vec<_>>().join(" ");
-    Design {
+    SweepDesign {
         design: label,
         settings,
         conditions: BTreeMap::new(),

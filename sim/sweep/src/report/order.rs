@@ -11,7 +11,7 @@ use core::f64::consts::{FRAC_1_SQRT_2, PI};
 use serde::Serialize;
 use traces::stats::Random;
 
-use super::design::{Cost, Design};
+use super::design::{Cost, SweepDesign};
 
 /// Most designs of a workload for which probabilities are drawn.
 const MAX_DRAWN: usize = 400;
@@ -25,7 +25,7 @@ const SEED: u64 = 1;
 pub struct RatedDesign {
     /// The design.
     #[serde(flatten)]
-    pub design: Design,
+    pub design: SweepDesign,
     /// Whether no other is at least as good in time, energy and area, and better in one of them.
     pub on_frontier: bool,
     /// Share of random draws within all stated uncertainties in which it is on the frontier. `None` of more
@@ -38,7 +38,7 @@ pub struct RatedDesign {
 }
 
 /// Compares the designs of a workload.
-pub(crate) fn rated(designs: Vec<Design>) -> Vec<RatedDesign> {
+pub(crate) fn rated(designs: Vec<SweepDesign>) -> Vec<RatedDesign> {
     let points: Vec<[f64; 3]> =
         designs.iter().map(|design| [design.time_s.value, design.energy_j.value, area(design)]).collect();
     let on = nondominated(&points);
@@ -56,7 +56,7 @@ pub(crate) fn rated(designs: Vec<Design>) -> Vec<RatedDesign> {
 }
 
 /// Area; the same for all where it is not known.
-fn area(design: &Design) -> f64 {
+fn area(design: &SweepDesign) -> f64 {
     design.area_mm2.unwrap_or(0.0)
 }
 
@@ -94,7 +94,7 @@ pub(crate) fn nondominated(points: &[[f64; 3]]) -> Vec<bool> {
 }
 
 /// Share of draws in which each design is on the frontier.
-fn probabilities(designs: &[Design]) -> Option<Vec<f64>> {
+fn probabilities(designs: &[SweepDesign]) -> Option<Vec<f64>> {
     if designs.len() > MAX_DRAWN {
         return None;
     }
@@ -106,7 +106,7 @@ fn probabilities(designs: &[Design]) -> Option<Vec<f64>> {
     let mut counts = vec![0_u32; designs.len()];
     for draw in 0..DRAWS {
         let (table, _) = shared.normals(draw);
-        let drawn = |(at, (design, costs)): (usize, (&Design, &[LogCost; 2]))| {
+        let drawn = |(at, (design, costs)): (usize, (&SweepDesign, &[LogCost; 2]))| {
             let (a, b) = own.normals(draw * designs.len() as u64 + at as u64);
             [costs[0].drawn(table, a), costs[1].drawn(table, b), area(design)]
         };
@@ -168,7 +168,7 @@ impl LogCost {
     }
 
     /// Energy times time. Errors of the level in both may have one cause, so they add up.
-    pub fn product(design: &Design) -> Self {
+    pub fn product(design: &SweepDesign) -> Self {
         let [a, b] = [&design.time_s, &design.energy_j].map(|cost| Self::of(cost, design.runs));
         Self {
             mean: a.mean + b.mean,

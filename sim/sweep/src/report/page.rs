@@ -3,7 +3,7 @@
 use std::io::{self, Write};
 
 use minijinja::{Environment, context};
-use output::plot::{AxisSpec, Chart, ChartPanel, Mark, Paint, Picture, PlotError, PlotStyle, Series};
+use output::plot::{AxisSpec, Chart, ChartPanel, Paint, Picture, PlotError, PlotMark, PlotStyle, Series};
 use output::table::si;
 use serde::Serialize;
 use traces::pareto::nondominated;
@@ -108,7 +108,8 @@ impl SweepReport {
             let steps = steps(&designs.iter().filter_map(at).collect::<Vec<_>>());
             if steps.len() > 1 {
                 series.push(
-                    Series::new(workload.clone(), Mark::Steps(steps)).painted(Paint::Like(2 + number % 6)),
+                    Series::new(workload.clone(), PlotMark::Steps(steps))
+                        .painted(Paint::Like(2 + number % 6)),
                 );
             }
         }
@@ -125,8 +126,8 @@ impl SweepReport {
         if frontier.is_empty() {
             return None;
         }
-        series.push(Series::new("dominated", Mark::Rings(others)).painted(Paint::Like(0)));
-        series.push(Series::new("on the frontier", Mark::Dots(frontier)).painted(Paint::Like(0)));
+        series.push(Series::new("dominated", PlotMark::Rings(others)).painted(Paint::Like(0)));
+        series.push(Series::new("on the frontier", PlotMark::Dots(frontier)).painted(Paint::Like(0)));
         let axes = [x, y].map(|(name, unit, _)| AxisSpec::even(name, unit));
         Some(ChartPanel::over("", axes, series))
     }

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::design::Design;
+use super::design::SweepDesign;
 use super::order::{Difference, LogCost};
 
 /// Designs after the best that are compared with it.
@@ -50,7 +50,7 @@ impl Measure {
         }
     }
 
-    fn of(self, design: &Design) -> Option<f64> {
+    fn of(self, design: &SweepDesign) -> Option<f64> {
         match self {
             Self::Time => Some(design.time_s.value),
             Self::Energy => Some(design.energy_j.value),
@@ -59,7 +59,7 @@ impl Measure {
         }
     }
 
-    fn log(self, design: &Design) -> LogCost {
+    fn log(self, design: &SweepDesign) -> LogCost {
         match self {
             Self::Energy => LogCost::of(&design.energy_j, design.runs),
             Self::EnergyDelay => LogCost::product(design),
@@ -121,29 +121,30 @@ pub struct NearBest {
     pub design: String,
     /// Designs to choose from.
     pub candidates: usize,
-    /// Its cost by `near` over that of the best.
+    /// Cost of the design by `near` over that of the best.
     pub near_ratio: f64,
-    /// Its cost by `cheapest` over that of the best by `near`.
+    /// Cost of the design by `cheapest` over that of the best by `near`.
     pub cheapest_ratio: f64,
     /// Whether platform and energy table are not those of its GPU.
     pub platform_mismatch: bool,
 }
 
 /// Designs in the order of a measure; equal ones in the order of the plan.
-fn sorted(designs: &[Design], measure: Measure) -> Vec<&Design> {
-    let mut sorted: Vec<(f64, &Design)> =
+fn sorted(designs: &[SweepDesign], measure: Measure) -> Vec<&SweepDesign> {
+    let mut sorted: Vec<(f64, &SweepDesign)> =
         designs.iter().filter_map(|design| Some((measure.of(design)?, design))).collect();
     sorted.sort_by(|a, b| a.0.total_cmp(&b.0));
     sorted.into_iter().map(|(_, design)| design).collect()
 }
 
 /// Winners of a workload.
-pub(crate) fn winners(workload: &str, designs: &[Design]) -> Vec<Winner> {
+pub(crate) fn winners(workload: &str, designs: &[SweepDesign]) -> Vec<Winner> {
     let winner = |measure: Measure| {
         let sorted = sorted(designs, measure);
         let (best, others) = sorted.split_first()?;
         let log = measure.log(best);
-        let is_undecided = |other: &&&Design| Difference::new(&log, &measure.log(other)).flips() > UNDECIDED;
+        let is_undecided =
+            |other: &&&SweepDesign| Difference::new(&log, &measure.log(other)).flips() > UNDECIDED;
         Some(Winner {
             workload: workload.to_owned(),
             measure,
@@ -158,10 +159,10 @@ pub(crate) fn winners(workload: &str, designs: &[Design]) -> Vec<Winner> {
 }
 
 /// The best design by each measure against the next ones.
-pub(crate) fn pairs(workload: &str, designs: &[Design]) -> Vec<Pair> {
+pub(crate) fn pairs(workload: &str, designs: &[SweepDesign]) -> Vec<Pair> {
     let of = |measure: Measure| {
         let sorted = sorted(designs, measure);
-        let pair = |best: &Design, other: &Design| {
+        let pair = |best: &SweepDesign, other: &SweepDesign| {
             let difference = Difference::new(&measure.log(best), &measure.log(other));
             let [low, high] = difference.interval();
             Pair {
@@ -176,18 +177,18 @@ pub(crate) fn pairs(workload: &str, designs: &[Design]) -> Vec<Pair> {
             }
         };
         let best = sorted.first().copied();
-        let others: Vec<&Design> = sorted.into_iter().skip(1).take(MAX_PAIRS).collect();
+        let others: Vec<&SweepDesign> = sorted.into_iter().skip(1).take(MAX_PAIRS).collect();
         best.map_or(Vec::new(), |best| others.into_iter().map(|other| pair(best, other)).collect())
     };
     Measure::ALL.into_iter().flat_map(of).collect()
 }
 
 /// Cheapest designs of those that are `within` of the best by another measure.
-pub(crate) fn near_best(workload: &str, designs: &[Design], within: f64) -> Vec<NearBest> {
+pub(crate) fn near_best(workload: &str, designs: &[SweepDesign], within: f64) -> Vec<NearBest> {
     let of = |(near, cheapest): (Measure, Measure)| {
         let best = *sorted(designs, near).first()?;
         let limit = near.of(best)? * (1.0 + within);
-        let candidates: Vec<Design> = designs
+        let candidates: Vec<SweepDesign> = designs
             .iter()
             .filter(|design| near.of(design).is_some_and(|cost| cost <= limit))
             .cloned()
@@ -219,7 +220,7 @@ mod tests {
     use super::*;
     use crate::report::exact;
 
-    fn named(name: &str, time_s: f64, energy_j: f64) -> Design {
+    fn named(name: &str, time_s: f64, energy_j: f64) -> SweepDesign {
         exact(&[("gpu.a", name)], time_s, energy_j)
     }
 

@@ -366,7 +366,7 @@ impl Warp {
         }
     }
 
-    /// Its events of its data unit.
+    /// Events of the warp in its data unit.
     pub fn data(&self, demand: &ServiceDemand) -> [u32; DATA_EVENTS] {
         demand.data.map(|whole| share(whole, self.part, self.parts).len() as u32)
     }

@@ -109,8 +109,8 @@ fn pass_times(timed: &Timed) -> Vec<u64> {
 }
 
 /// Time of the spans that are requested.
-fn spent(spans: &[DrawSpan], is_asked: impl Fn(&DrawSpan) -> bool) -> u64 {
+fn spent(spans: &[DrawSpan], is_requested: impl Fn(&DrawSpan) -> bool) -> u64 {
     let mut before = 0;
     let each = spans.iter().map(|span| (span, span.end_ps - std::mem::replace(&mut before, span.end_ps)));
-    each.filter(|(span, _)| is_asked(span)).map(|(_, time)| time).sum()
+    each.filter(|(span, _)| is_requested(span)).map(|(_, time)| time).sum()
 }

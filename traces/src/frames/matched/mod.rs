@@ -16,7 +16,7 @@ use super::profile::summed_squared_difference;
 use super::subsample::align;
 use super::threshold::{Threshold, choose};
 use super::{FinderMethod, Found, FrameStart, marked_start};
-use crate::clock::Clock;
+use crate::clock::SampleClock;
 use crate::stats::{PairSum, mean, upper_median};
 use crate::trace::Trace;
 use core::convert::Infallible;
@@ -39,7 +39,7 @@ const MAX_MATCH_SHARE: f64 = 0.5;
 pub(crate) struct Matched {
     pub found: Found,
     pub sums_w: Vec<PairSum>,
-    pub clock: Clock,
+    pub clock: SampleClock,
     pub total_w: PairSum,
 }
 
@@ -72,7 +72,7 @@ impl Samples for InMemory<'_> {
 pub(super) fn find_matched(trace: &Trace, marks: &Marks, method: FinderMethod) -> Result<Found, MarkError> {
     let placement = marks.place(trace)?;
     let samples = trace.samples() as u64;
-    let clock = Clock { start_s: trace.start_s(), rate_hz: trace.rate_hz(), samples: Some(samples) };
+    let clock = SampleClock { start_s: trace.start_s(), rate_hz: trace.rate_hz(), samples: Some(samples) };
     let window = |mark: &Placed| -> Vec<f64> {
         let places = mark.first..mark.first + placement.samples;
         let powers = trace.voltage_v()[places.clone()].iter().zip(&trace.current_a()[places]);
@@ -90,7 +90,7 @@ type Summed = (FrameStart, PairSum);
 impl MatchPlan {
     /// From minima to frames.
     pub fn conclude(&self, marks: &Marks, mut gathered: Gathered) -> Matched {
-        let clock = Clock { samples: Some(gathered.samples), ..self.clock };
+        let clock = SampleClock { samples: Some(gathered.samples), ..self.clock };
         let trace_end_s = clock.time_s(gathered.samples as f64);
         let marks = Marks { end_s: marks.end_s.min(trace_end_s), ..marks.clone() };
         let sigma_w = noise_deviation(upper_median(&mut gathered.steps_w));

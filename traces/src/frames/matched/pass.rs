@@ -2,7 +2,7 @@
 
 use super::screen::{Buffers, Screen, minima};
 use super::{Piece, Template, powers};
-use crate::clock::Clock;
+use crate::clock::SampleClock;
 use crate::frames::marks::{Marks, Placed, Placement};
 use crate::frames::subsample::vertex;
 use crate::frames::{FinderMethod, spacing};
@@ -73,7 +73,7 @@ pub(crate) struct Gathered {
 
 /// The parameters of a pass.
 pub(crate) struct MatchPlan {
-    pub(super) clock: Clock,
+    pub(super) clock: SampleClock,
     pub(super) placement: Placement,
     /// The marks' windows.
     pub(super) templates: Vec<Template>,
@@ -90,7 +90,7 @@ impl MatchPlan {
     /// To find what resembles `windows`, the powers (W) of the marks, by [`FinderMethod::Normalized`] or else
     /// by squares.
     pub fn new(
-        clock: Clock,
+        clock: SampleClock,
         placement: Placement,
         windows: Vec<Vec<f64>>,
         marks: &Marks,

@@ -499,7 +499,7 @@ impl Likeness {
 #[cfg(test)]
 mod tests {
     use crate::energy::{TOLERANCE_S, pairs};
-    use crate::frames::{FinderMethod, Marks, Options, default_window, find_with};
+    use crate::frames::{FinderMethod, FinderOptions, Marks, default_window, find_with};
     use crate::synth::HELD_OUT_DEVICES;
 
     #[test]
@@ -511,7 +511,7 @@ mod tests {
         // Frames from the end mark on are not searched for.
         let (end_s, truth_s) = (truth_s[70], &truth_s[..70]);
         let marks = Marks::one(truth_s[32], default_window(0.0, trace.rate_hz()), end_s);
-        let options = Options { method: FinderMethod::Segments, without: None };
+        let options = FinderOptions { method: FinderMethod::Segments, without: None };
         let found = find_with(&trace, &marks, &options).unwrap();
         let found_s: Vec<f64> = found.starts.iter().map(|start| start.time_s).collect();
         let paired = pairs(&found_s, truth_s, TOLERANCE_S).len();

@@ -28,7 +28,7 @@ pub struct PerfettoTimeline<'a> {
     /// Name of the process, for example `quintile default on hd7970`.
     pub process: &'a str,
     /// Frames in order.
-    pub frames: Vec<FrameSpan>,
+    pub frames: Vec<FrameSlice>,
     /// Units in the order of display.
     pub units: Vec<UnitTrack<'a>>,
     /// Counters in the order of display.
@@ -37,7 +37,7 @@ pub struct PerfettoTimeline<'a> {
 
 /// A frame from its start to the start of the next.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct FrameSpan {
+pub struct FrameSlice {
     /// The number of the frame.
     pub frame: u64,
     /// Start.
@@ -46,7 +46,7 @@ pub struct FrameSpan {
     pub busy_end_ns: u64,
     /// Start of the next frame, not before `busy_end_ns`.
     pub end_ns: u64,
-    /// Its passes in order, without overlap.
+    /// Passes of the frame in order, without overlap.
     pub passes: Vec<PassSpan>,
     /// Numbers shown with the frame, each with a name that carries its unit, for example `energy_mJ`.
     pub numbers: Vec<(&'static str, f64)>,
@@ -55,13 +55,13 @@ pub struct FrameSpan {
 /// A pass of a frame, or a part of a pass.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct PassSpan {
-    /// Its name.
+    /// Name of the pass.
     pub name: String,
     /// Start, not before that of the frame.
     pub start_ns: u64,
     /// End of its work, not after that of the frame.
     pub end_ns: u64,
-    /// Its parts in order, without overlap, such as draws.
+    /// Parts of the pass in order, without overlap, such as draws.
     pub parts: Vec<PassSpan>,
 }
 
@@ -81,7 +81,7 @@ pub struct UnitTrack<'a> {
 pub struct CounterTrack<'a> {
     /// The quantity, for example `power, total`.
     pub name: &'a str,
-    /// Its unit, for example `W`.
+    /// Unit of the counter, for example `W`.
     pub unit: &'a str,
     /// Time in ns and value, in order of time.
     pub points: Vec<(u64, f64)>,
@@ -202,7 +202,7 @@ impl Trace<'_> {
         self.packet(Message::new().uint(13, INCREMENTAL_STATE_CLEARED).message(60, &descriptor))
     }
 
-    fn frames(&mut self, frames: &[FrameSpan]) -> io::Result<()> {
+    fn frames(&mut self, frames: &[FrameSlice]) -> io::Result<()> {
         self.track(&child_track(FRAMES_UUID, "frames", 0))?;
         for frame in frames {
             self.begin(FRAMES_UUID, &format!("frame {}", frame.frame), frame.start_ns, &frame.numbers)?;

@@ -337,12 +337,12 @@ fn nearest(a: [DVec3; 2], b: [DVec3; 2]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::collision::{Method, Search, detect};
+    use crate::collision::{CollisionMethod, PairSearch, detect};
 
     #[test]
     fn every_collision_of_every_family_is_found() {
         for zoom in [false, true] {
-            let search = Search { resolution: 16, bins: 4, method: Method::FragmentBox, zoom };
+            let search = PairSearch { resolution: 16, bins: 4, method: CollisionMethod::FragmentBox, zoom };
             for case in cases(7, 4).into_iter().chain(reference_cases(7, 6, 1)) {
                 let found = detect(&case.objects, &search);
                 for &(a, b) in &case.collide {

@@ -29,7 +29,7 @@ use crate::import;
 use crate::import::{MaterialWarning, reader};
 use crate::material::{Alpha, Material};
 use crate::scene::Bounds;
-use crate::scene::{Clip, Instance, Mesh, Parts};
+use crate::scene::{AnimationClip, Instance, Mesh, Parts};
 use nodes::Tree;
 
 /// Source of the materials.
@@ -57,10 +57,10 @@ pub(super) fn import(path: &Path, clip: Option<&str>, looks: MaterialSource) -> 
     parts.camera = parts.cameras.first().map(|own| own.camera.clone()).unwrap_or_default();
     parts.graph.nodes = tree.nodes;
     if !parts.clips.is_empty() {
-        let chosen = clip.map_or(Ok(0), |wanted| Clip::find(&parts.clips, wanted))?;
+        let chosen = clip.map_or(Ok(0), |wanted| AnimationClip::find(&parts.clips, wanted))?;
         parts.clips[chosen].play(&mut parts.graph.nodes);
     } else if let Some(wanted) = clip {
-        Clip::find(&parts.clips, wanted)?;
+        AnimationClip::find(&parts.clips, wanted)?;
     }
     Ok(parts)
 }

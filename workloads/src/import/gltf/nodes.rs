@@ -15,8 +15,8 @@ use super::Document;
 use crate::error::LoadError;
 use crate::material::Light;
 use crate::scene::{
-    Clip, Frustum, Instant, Interpolation, Local, Node, OwnCamera, Property, Rig, SceneCamera, Skin, Track,
-    Trs, unit_quat, world_poses,
+    AnimationClip, Frustum, Instant, Interpolation, Local, Node, OwnCamera, Property, Rig, SceneCamera, Skin,
+    Track, Trs, unit_quat, world_poses,
 };
 
 /// The file's nodes, reordered.
@@ -122,7 +122,7 @@ fn local(node: &json::Node) -> Option<Local> {
     (trs.translation.is_finite() && rotation.is_finite() && trs.scale.is_finite()).then_some(Local::Trs(trs))
 }
 
-pub(super) fn clips(document: &Document, tree: &Tree) -> Result<Vec<Clip>, LoadError> {
+pub(super) fn clips(document: &Document, tree: &Tree) -> Result<Vec<AnimationClip>, LoadError> {
     let mut clips = Vec::new();
     for (index, animation) in document.root.animations.iter().enumerate() {
         let mut tracks = Vec::new();
@@ -131,7 +131,7 @@ pub(super) fn clips(document: &Document, tree: &Tree) -> Result<Vec<Clip>, LoadE
         }
         let duration_s = tracks.iter().map(|(.., track)| track.end_s()).fold(0.0, f64::max);
         let name = animation.name.clone().unwrap_or_else(|| format!("clip {index}"));
-        clips.push(Clip { name, duration_s, tracks });
+        clips.push(AnimationClip { name, duration_s, tracks });
     }
     Ok(clips)
 }

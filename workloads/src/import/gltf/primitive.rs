@@ -9,7 +9,7 @@ use warnings::{Code, Warning};
 use super::Document;
 use crate::error::LoadError;
 use crate::material::Material;
-use crate::scene::{Influences, Mesh, Normals, Target};
+use crate::scene::{Influences, Mesh, MorphTarget, Normals};
 
 /// The primitive being read, and its place for error messages.
 struct Reading<'d, 'a> {
@@ -177,7 +177,7 @@ impl Reading<'_, '_> {
         Ok(())
     }
 
-    fn targets(&self, count: usize) -> Result<Vec<Target>, LoadError> {
+    fn targets(&self, count: usize) -> Result<Vec<MorphTarget>, LoadError> {
         let mut targets = Vec::new();
         for (index, target) in self.primitive.targets.iter().flatten().enumerate() {
             let read = |accessor: Option<gltf::json::Index<_>>, what: &str| -> Result<Vec<Vec3>, LoadError> {
@@ -186,7 +186,7 @@ impl Reading<'_, '_> {
                 let values = self.accessor(accessor.value(), &[Type::Vec3], &what)?;
                 Ok(self.vectors(&values, count, &what)?.into_iter().map(Vec3::from_array).collect())
             };
-            targets.push(Target {
+            targets.push(MorphTarget {
                 positions: read(target.positions, "position")?,
                 normals: read(target.normals, "normal")?,
             });

@@ -38,9 +38,9 @@ pub(super) fn surface(path: &Path) -> Result<Soup, LoadError> {
 
 /// Corners with equal numbers are one vertex, in the order in which faces use them.
 fn geometry(found: &Statements) -> Soup {
-    let mut numbers: HashMap<Corner, u32> = HashMap::new();
+    let mut numbers: HashMap<FaceCorner, u32> = HashMap::new();
     let mut corners = Vec::new();
-    let mut number = |corner: Corner| {
+    let mut number = |corner: FaceCorner| {
         *numbers.entry(corner).or_insert_with(|| {
             corners.push(corner);
             corners.len() as u32 - 1
@@ -48,7 +48,7 @@ fn geometry(found: &Statements) -> Soup {
     };
     let triangles = found.faces.iter().map(|face| face.corners.map(&mut number)).collect();
     let colors = found.linear_colors();
-    let of_position = |corner: &Corner| corner.position as usize;
+    let of_position = |corner: &FaceCorner| corner.position as usize;
     let mut soup = Soup {
         positions: corners.iter().map(|corner| found.positions[of_position(corner)]).collect(),
         triangles,
@@ -70,7 +70,7 @@ fn geometry(found: &Statements) -> Soup {
 
 /// A corner of a face: its position, texture coordinate and normal by number, from zero on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub struct Corner {
+pub struct FaceCorner {
     pub position: u32,
     pub uv: Option<u32>,
     pub normal: Option<u32>,
@@ -81,7 +81,7 @@ pub struct Corner {
 pub(crate) struct Face {
     /// The line of the file that its face is on, from one on.
     pub line: usize,
-    pub corners: [Corner; 3],
+    pub corners: [FaceCorner; 3],
     /// The material by its place in [`Statements::materials`]; `None` before any is named.
     pub material: Option<u32>,
 }
@@ -234,7 +234,7 @@ impl Reading {
             self.statements.dropped.push(self.line);
         }
         let fan = corners.windows(2).skip(1);
-        let face = |pair: &[Corner]| Face {
+        let face = |pair: &[FaceCorner]| Face {
             line: self.line,
             corners: [corners[0], pair[0], pair[1]],
             material: self.material,
@@ -244,7 +244,7 @@ impl Reading {
     }
 
     /// `position/uv/normal`, the latter two or the last left out or empty.
-    fn corner(&self, word: &str) -> Result<Corner, String> {
+    fn corner(&self, word: &str) -> Result<FaceCorner, String> {
         let found = &self.statements;
         let mut parts = word.split('/');
         let mut next = |count: usize| match parts.next() {
@@ -252,7 +252,7 @@ impl Reading {
             Some(text) => number(text, count).map(Some).ok_or_else(|| format!("`{word}` is not a corner")),
         };
         let position = next(found.positions.len())?.ok_or_else(|| format!("`{word}` is not a corner"))?;
-        Ok(Corner { position, uv: next(found.uvs.len())?, normal: next(found.normals.len())? })
+        Ok(FaceCorner { position, uv: next(found.uvs.len())?, normal: next(found.normals.len())? })
     }
 
     fn use_material(&mut self, name: &str) {

@@ -16,8 +16,8 @@ use crate::error::{LoadError, Source};
 use crate::import::{Format, bare, gltf, reader, soup};
 use crate::material::{Alpha, Light, Material};
 use crate::scene::{
-    CameraSpec, Interpolation, Local, Mesh, Node, Parts, Rig, SceneCamera, Settings, Spin, Target, Track,
-    Trs, rotation,
+    CameraSpec, Interpolation, Local, Mesh, MorphTarget, Node, Parts, Rig, SceneCamera, Settings, Spin,
+    Track, Trs, rotation,
 };
 use crate::shapes::checker;
 use crate::{import, shapes};
@@ -340,7 +340,7 @@ fn add_gltf(
 }
 
 /// What takes `mesh`, positions relative to `origin`, to the vertices in the file at `end`, as a morph target.
-fn to_end(mesh: &Mesh, end: &Path, origin: DVec3) -> Result<Target, LoadError> {
+fn to_end(mesh: &Mesh, end: &Path, origin: DVec3) -> Result<MorphTarget, LoadError> {
     let format = Format::of(end).filter(|format| format.is_surface());
     let format = format.ok_or_else(|| broken(end, "end", format!("it has to be a {SURFACES} file")))?;
     let other = bare(end, format)?.into_mesh(end, origin)?;
@@ -357,7 +357,7 @@ fn to_end(mesh: &Mesh, end: &Path, origin: DVec3) -> Result<Target, LoadError> {
         return Err(broken(end, "end", message));
     }
     let positions = mesh.positions.iter().zip(&other.positions).map(|(from, to)| *to - *from).collect();
-    Ok(Target { positions, normals: Vec::new() })
+    Ok(MorphTarget { positions, normals: Vec::new() })
 }
 
 fn solid(shape: &ShapeSpec, material: usize) -> Mesh {

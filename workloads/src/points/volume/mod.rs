@@ -1,7 +1,7 @@
 //! Uniform points in volumes (thesis, Paper VI, section 5, "The 5D Rasterizer as a Volumetric Sampler").
 //!
 //! - [`Torus`], [`Solid`]: volumes with an exact inside test.
-//! - [`Bounds`]: *conservative mode*. The rasterizer bounds the third coordinate of a volume in every tile:
+//! - [`SolidBounds`]: *conservative mode*. The rasterizer bounds the third coordinate of a volume in every tile:
 //!   the time of moving triangles for a [`Torus`], the depth of the surface for a [`Solid`]. Random points of
 //!   these bounds are tested.
 //! - [`standard_mode`]: samples of a pass that moving triangles cover and whose pixel shader finds them
@@ -34,7 +34,7 @@ struct Hull<'a> {
 
 /// Range of the third coordinate of a solid in every tile.
 #[derive(Clone, Debug)]
-pub struct Bounds {
+pub struct SolidBounds {
     grid: Grid,
     columns: Vec<Option<[f64; 2]>>,
     /// Triangles that touch each tile.
@@ -57,7 +57,7 @@ const CHUNK: u64 = 1 << 14;
 /// Most candidates per point.
 const MAX_CANDIDATES_PER_POINT: u64 = 1 << 20;
 
-impl Bounds {
+impl SolidBounds {
     fn new(hull: &Hull<'_>, grid: Grid) -> Self {
         let tiles = grid.columns as usize * grid.rows as usize;
         let (mut columns, mut lists) = (vec![None; tiles], vec![Vec::new(); tiles]);
@@ -145,7 +145,7 @@ impl Bounds {
 #[derive(Clone, Debug)]
 pub struct Solid {
     triangles: Vec<[DVec3; 3]>,
-    bounds: Bounds,
+    bounds: SolidBounds,
 }
 
 /// Reason why a surface encloses no volume.
@@ -190,7 +190,7 @@ impl Solid {
         let moving = whole.ok_or(SolidError::TooFar)?;
         let times = vec![[0.0, 1.0]; moving.len()];
         let hull = Hull { triangles: &moving, times: &times, by_time: false };
-        let solid = Self { bounds: Bounds::new(&hull, grid(&triangles, tiles)), triangles };
+        let solid = Self { bounds: SolidBounds::new(&hull, grid(&triangles, tiles)), triangles };
         if solid.volume().abs() > 0.0 { Ok(solid) } else { Err(SolidError::Flat) }
     }
 
@@ -200,7 +200,7 @@ impl Solid {
     }
 
     /// Bounds for random points.
-    pub fn bounds(&self) -> &Bounds {
+    pub fn bounds(&self) -> &SolidBounds {
         &self.bounds
     }
 }
@@ -344,7 +344,7 @@ impl Torus {
     }
 
     /// Bounds over `tiles` by `tiles` tiles of the unit square, from prisms as in [`standard_mode`].
-    pub fn bounds(&self, tiles: u32) -> Bounds {
+    pub fn bounds(&self, tiles: u32) -> SolidBounds {
         let (mut triangles, mut times) = (Vec::new(), Vec::new());
         for layer in self.layers(16, 32) {
             let at = |end: usize, vertex: u32| {
@@ -359,7 +359,7 @@ impl Torus {
         }
         let side = 1.0 / f64::from(tiles);
         let grid = Grid { origin: [0.0; 2], tile: [side; 2], columns: tiles, rows: tiles };
-        Bounds::new(&Hull { triangles: &triangles, times: &times, by_time: true }, grid)
+        SolidBounds::new(&Hull { triangles: &triangles, times: &times, by_time: true }, grid)
     }
 }
 
@@ -371,7 +371,7 @@ impl Inside for Torus {
 }
 
 impl Volume for Torus {
-    fn has(&self, lane: &Lane, &[x, y, t, ..]: &Point) -> bool {
+    fn has(&self, lane: &Lane, &[x, y, t, ..]: &SamplePoint) -> bool {
         let [x, y, t] = [x, y, t].map(|at| lane.sub(at, 0.5));
         let from_ring = lane.sub(lane.root(lane.madd(y, y, lane.mul(x, x))), self.ring);
         lane.branch(lane.madd(t, t, lane.mul(from_ring, from_ring)) <= self.tube * self.tube)
@@ -421,7 +421,7 @@ impl Prisms {
 }
 
 /// The space of samples: x and y (up) of the unit square, time, and both axes of the lens, -1 to 1.
-pub type Point = [f64; 5];
+pub type SamplePoint = [f64; 5];
 
 mod standard;
-pub use standard::{Blurred, Covered, Volume, every_sample, fill, standard_mode};
+pub use standard::{Blurred, CoveredSamples, Volume, every_sample, fill, standard_mode};

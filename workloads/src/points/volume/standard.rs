@@ -9,12 +9,12 @@ use pipeline::{
     ShadingPoint, Viewport,
 };
 
-use super::{DEPTH, Layer, MARGIN, Point, Prisms};
+use super::{DEPTH, Layer, MARGIN, Prisms, SamplePoint};
 
 /// A volume in the space of samples.
 pub trait Volume: Sync {
     /// Whether a sample is inside, with operations that the lane counts.
-    fn has(&self, lane: &Lane, point: &Point) -> bool;
+    fn has(&self, lane: &Lane, point: &SamplePoint) -> bool;
 
     /// Moving triangles around it.
     fn prisms(&self) -> Vec<Prisms>;
@@ -58,7 +58,7 @@ impl Blurred {
     }
 
     /// Squared distance from the axis.
-    pub fn from_axis(&self, lane: &Lane, &[x, y, t, u, v]: &Point) -> f64 {
+    pub fn from_axis(&self, lane: &Lane, &[x, y, t, u, v]: &SamplePoint) -> f64 {
         let apart = |at: f64, lens: f64, axis: usize| {
             let [open, close] = self.middle.map(|middle| middle[axis]);
             let middle = lane.madd(t, close - open, open);
@@ -73,7 +73,7 @@ impl Blurred {
 const CORNERS: u32 = 32;
 
 impl Volume for Blurred {
-    fn has(&self, lane: &Lane, point: &Point) -> bool {
+    fn has(&self, lane: &Lane, point: &SamplePoint) -> bool {
         let radius = lane.madd(point[2], self.radius[1] - self.radius[0], self.radius[0]);
         lane.branch(self.from_axis(lane, point) <= lane.mul(radius, radius))
     }
@@ -100,9 +100,9 @@ impl Volume for Blurred {
 
 /// Samples of the rasterizer that were found inside.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Covered {
+pub struct CoveredSamples {
     /// Samples inside the volume.
-    pub points: Vec<Point>,
+    pub points: Vec<SamplePoint>,
     /// Number of samples that a triangle covers.
     pub covered: u64,
     /// Number of all samples.
@@ -121,7 +121,7 @@ fn camera(lens: f64) -> Option<Camera> {
 }
 
 /// Position of a sample.
-fn place(sample: &Sample, pixel: [u32; 2], side: u32) -> Point {
+fn place(sample: &Sample, pixel: [u32; 2], side: u32) -> SamplePoint {
     let across = (f64::from(pixel[0]) + f64::from(sample.x)) / f64::from(side);
     let down = (f64::from(pixel[1]) + f64::from(sample.y)) / f64::from(side);
     [across, 1.0 - down, f64::from(sample.t), f64::from(sample.u), f64::from(sample.v)]
@@ -163,9 +163,9 @@ pub fn fill(
     side: u32,
     samples: &dyn SampleSource,
     gpu: &mut Gpu<'_>,
-) -> Result<Covered, PassError> {
+) -> Result<CoveredSamples, PassError> {
     let (Some(camera), Some(viewport)) = (camera(domain.lens()), Viewport::new(side, side)) else {
-        return Ok(Covered::default());
+        return Ok(CoveredSamples::default());
     };
     let (spec, background) = (gpu.spec(), Vec3::ZERO);
     let settings = Settings { spec, viewport, samples, background };
@@ -174,10 +174,11 @@ pub fn fill(
     let pass = RasterPass::new(&camera, &draws, &settings).named("volume").with_visible().shaded_per_sample();
     let drawn = gpu.draw(&pass)?;
     let hits = gpu.counts_of_pass()[activity::Event::SamplesHit];
-    let mut found = Covered { covered: hits, samples: drawn.visible.len() as u64, ..Covered::default() };
+    let mut found =
+        CoveredSamples { covered: hits, samples: drawn.visible.len() as u64, ..CoveredSamples::default() };
     let is_hit = |number: usize| drawn.visible[number].0 != u32::MAX;
     each_sample(side, samples, |number, point| found.points.extend(is_hit(number).then_some(point)));
-    Ok(Covered { image: drawn.into_image(), ..found })
+    Ok(CoveredSamples { image: drawn.into_image(), ..found })
 }
 
 /// The same on a GPU of its own, and its work.
@@ -189,21 +190,21 @@ pub fn standard_mode(
     side: u32,
     samples: &dyn SampleSource,
     spec: &PipelineSpec,
-) -> Result<(Covered, FrameReport), PassError> {
+) -> Result<(CoveredSamples, FrameReport), PassError> {
     let mut gpu = Gpu::without_packets(spec)?;
     let found = fill(domain, side, samples, &mut gpu)?;
     Ok((found, gpu.finish()))
 }
 
 /// The samples inside a volume, by testing every one: the reference without a rasterizer.
-pub fn every_sample(domain: &dyn Volume, side: u32, samples: &dyn SampleSource) -> Vec<Point> {
+pub fn every_sample(domain: &dyn Volume, side: u32, samples: &dyn SampleSource) -> Vec<SamplePoint> {
     let (lane, mut found) = (Lane::default(), Vec::new());
     each_sample(side, samples, |_, point| found.extend(domain.has(&lane, &point).then_some(point)));
     found
 }
 
 /// Every sample of an image with its number.
-fn each_sample(side: u32, samples: &dyn SampleSource, mut each: impl FnMut(usize, Point)) {
+fn each_sample(side: u32, samples: &dyn SampleSource, mut each: impl FnMut(usize, SamplePoint)) {
     let per_pixel = samples.per_pixel() as usize;
     let mut own = vec![Sample::default(); per_pixel];
     for pixel in 0..side * side {

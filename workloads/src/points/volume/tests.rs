@@ -24,7 +24,7 @@ fn the_torus_has_the_volume_and_the_moment_of_its_samples() {
     let share = torus.volume();
     let deviation = (all * share * (1.0 - share)).sqrt();
     assert!((n - all * share).abs() < 3.0 * deviation, "{n} of {}", all * share);
-    let moment = |[x, y, ..]: &Point| (x - 0.5).powi(2) + (y - 0.5).powi(2);
+    let moment = |[x, y, ..]: &SamplePoint| (x - 0.5).powi(2) + (y - 0.5).powi(2);
     let sum: f64 = found.points.iter().map(moment).sum();
     assert!((sum / all / torus.moment() - 1.0).abs() < 0.01, "{}", sum / all);
     assert!(found.covered as f64 > n && (found.covered as f64) < 1.2 * n, "{} covered", found.covered);

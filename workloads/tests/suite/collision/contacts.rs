@@ -1,7 +1,7 @@
 //! Constructed contacts.
 
 use pipeline::random::mix;
-use workloads::collision::{Method, Object, Search, detect};
+use workloads::collision::{CollisionMethod, Object, PairSearch, detect};
 
 use super::{Ends, SEARCHES, may_collide, random};
 
@@ -90,7 +90,7 @@ fn crowd(seed: u64, which: u64) -> impl Iterator<Item = Ends> {
 
 #[test]
 fn a_contact_in_a_crowd_is_not_missed_by_boxes() {
-    let search = Search { resolution: 64, bins: 16, method: Method::FragmentBox, zoom: true };
+    let search = PairSearch { resolution: 64, bins: 16, method: CollisionMethod::FragmentBox, zoom: true };
     let mut apart = 0;
     for seed in 0..120_u64 {
         let ([a, b], uncertainty) = contact(seed, 0.1);
@@ -98,11 +98,11 @@ fn a_contact_in_a_crowd_is_not_missed_by_boxes() {
             let of = |which, one| crowd(seed, which).chain(contact.then_some(one)).collect();
             [Object::from_ends(of(0, a), uncertainty).unwrap(), Object::from_ends(of(1, b), 0.0).unwrap()]
         };
-        let may = |objects: &[Object], search: &Search| {
+        let may = |objects: &[Object], search: &PairSearch| {
             detect(objects, search).first().is_some_and(|found| found.verdict.may_collide())
         };
-        for method in [Method::FragmentBox, Method::BoxBox] {
-            assert!(may(&objects(true), &Search { method, ..search }), "{seed} {method:?}");
+        for method in [CollisionMethod::FragmentBox, CollisionMethod::BoxBox] {
+            assert!(may(&objects(true), &PairSearch { method, ..search }), "{seed} {method:?}");
         }
         apart += u32::from(!may(&objects(false), &search));
     }

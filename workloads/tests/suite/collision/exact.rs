@@ -2,8 +2,9 @@
 //! time and quarters of a triangle, so both triangles share a point exactly. There is no allowance for
 //! rounding.
 
+use pipeline::random::SplitMix;
 use rayon::prelude::*;
-use workloads::collision::{Method, Object, Search};
+use workloads::collision::{CollisionMethod, Object, PairSearch};
 
 use super::{mix, objects_may_collide};
 
@@ -15,12 +16,11 @@ type Triangle = [[Point; 3]; 2];
 const UNIT: i64 = 32;
 
 /// Sequence of random integers.
-struct Rng(u64);
+struct Rng(SplitMix);
 
 impl Rng {
     fn below(&mut self, end: u64) -> u64 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        mix(self.0) % end
+        self.0.next_word() % end
     }
 
     fn one_in(&mut self, count: u64) -> bool {
@@ -193,27 +193,32 @@ fn scaled([first, second]: &[Vec<Triangle>; 2], units: [f64; 3], aside: i64) -> 
 }
 
 /// A random search. Many triangles are drawn by edges in few tiles only, as that is slow.
-fn search(rng: &mut Rng, triangles: usize) -> Search {
+fn search(rng: &mut Rng, triangles: usize) -> PairSearch {
     let zoom = rng.one_in(6);
     let finest = if triangles > 60 && !zoom { 8 } else { 64 };
-    let method =
-        [Method::FragmentBox, Method::FragmentBox, Method::BoxBox, Method::BoxBox, Method::DepthOnly];
+    let method = [
+        CollisionMethod::FragmentBox,
+        CollisionMethod::FragmentBox,
+        CollisionMethod::BoxBox,
+        CollisionMethod::BoxBox,
+        CollisionMethod::DepthOnly,
+    ];
     let resolution = 1 + rng.below(finest) as u32;
-    Search { resolution, bins: 1 + rng.below(16) as u32, method: method[rng.below(5) as usize], zoom }
+    PairSearch { resolution, bins: 1 + rng.below(16) as u32, method: method[rng.below(5) as usize], zoom }
 }
 
 /// Checks that several searches find each contact; counts the pairs separated after one object was moved
 /// aside.
 fn separated_when_moved(seeds: std::ops::Range<u64>, searches: usize) -> usize {
     let checked = |seed: u64| {
-        let mut rng = Rng(mix(seed));
+        let mut rng = Rng(SplitMix::new(mix(seed)));
         let (exact, unit) = case(&mut rng);
         let objects = scaled(&exact, [unit; 3], 0);
         for _ in 0..searches {
             let search = search(&mut rng, objects[0].len() + objects[1].len());
             assert!(objects_may_collide(&objects, &search), "{seed} is missed by {search:?}");
         }
-        let closer = Search { resolution: 64, ..Search::default() };
+        let closer = PairSearch { resolution: 64, ..PairSearch::default() };
         seed.is_multiple_of(20) && !objects_may_collide(&scaled(&exact, [unit; 3], 20 * UNIT), &closer)
     };
     seeds.into_par_iter().map(|seed| usize::from(checked(seed))).sum()
@@ -230,7 +235,7 @@ fn no_exact_contact_is_missed() {
 #[test]
 fn no_exact_contact_is_missed_with_any_units_per_axis() {
     (0..1500_u64).into_par_iter().for_each(|seed| {
-        let mut rng = Rng(mix(seed ^ 0x5EED));
+        let mut rng = Rng(SplitMix::new(mix(seed ^ 0x5EED)));
         let (exact, _) = case(&mut rng);
         let unit = |rng: &mut Rng| {
             let exponent = rng.below(1170) as i32 - 1070;

@@ -8,26 +8,26 @@ mod reference_rates;
 mod refinement;
 
 use pipeline::random::{mix, unit};
-use workloads::collision::{Method, Object, Search, detect};
+use workloads::collision::{CollisionMethod, Object, PairSearch, detect};
 
 type Ends = [[[f64; 3]; 3]; 2];
 
 /// Searches from the coarsest to the finest; none may miss a collision.
-const SEARCHES: [Search; 7] = [
-    Search { resolution: 1, bins: 1, method: Method::FragmentBox, zoom: false },
-    Search { resolution: 8, bins: 1, method: Method::BoxBox, zoom: false },
-    Search { resolution: 8, bins: 4, method: Method::FragmentBox, zoom: false },
-    Search { resolution: 32, bins: 16, method: Method::BoxBox, zoom: false },
-    Search { resolution: 16, bins: 1, method: Method::DepthOnly, zoom: false },
-    Search { resolution: 32, bins: 8, method: Method::BoxBox, zoom: true },
-    Search { resolution: 64, bins: 16, method: Method::FragmentBox, zoom: true },
+const SEARCHES: [PairSearch; 7] = [
+    PairSearch { resolution: 1, bins: 1, method: CollisionMethod::FragmentBox, zoom: false },
+    PairSearch { resolution: 8, bins: 1, method: CollisionMethod::BoxBox, zoom: false },
+    PairSearch { resolution: 8, bins: 4, method: CollisionMethod::FragmentBox, zoom: false },
+    PairSearch { resolution: 32, bins: 16, method: CollisionMethod::BoxBox, zoom: false },
+    PairSearch { resolution: 16, bins: 1, method: CollisionMethod::DepthOnly, zoom: false },
+    PairSearch { resolution: 32, bins: 8, method: CollisionMethod::BoxBox, zoom: true },
+    PairSearch { resolution: 64, bins: 16, method: CollisionMethod::FragmentBox, zoom: true },
 ];
 
-fn may_collide(a: Ends, b: Ends, search: &Search) -> bool {
+fn may_collide(a: Ends, b: Ends, search: &PairSearch) -> bool {
     objects_may_collide(&[a, b].map(|ends| Object::from_ends(vec![ends], 0.0).unwrap()), search)
 }
 
-fn objects_may_collide(objects: &[Object; 2], search: &Search) -> bool {
+fn objects_may_collide(objects: &[Object; 2], search: &PairSearch) -> bool {
     detect(objects, search).first().is_some_and(|answer| answer.verdict.may_collide())
 }
 

@@ -1,7 +1,7 @@
 //! Pairs that are separated or kept, and an oracle of many instants.
 
 use proptest::prelude::*;
-use workloads::collision::{Method, Search};
+use workloads::collision::{CollisionMethod, PairSearch};
 
 use super::{Ends, SEARCHES, may_collide, random};
 
@@ -11,9 +11,9 @@ fn paths_that_cross_at_different_times_are_separated_by_time_alone() {
     let square = |x: f64, y: f64| [[x, y, 0.0], [x + 0.2, y, 0.1], [x, y + 0.2, 0.2]];
     let a = [square(-2.0, 0.0), square(2.0, 0.0)];
     let b = [square(0.0, -1.0), square(0.0, 3.0)];
-    let plain = Search { resolution: 128, bins: 1, method: Method::FragmentBox, zoom: false };
+    let plain = PairSearch { resolution: 128, bins: 1, method: CollisionMethod::FragmentBox, zoom: false };
     assert!(!may_collide(a, b, &plain));
-    assert!(may_collide(a, b, &Search { method: Method::DepthOnly, ..plain }));
+    assert!(may_collide(a, b, &PairSearch { method: CollisionMethod::DepthOnly, ..plain }));
 }
 
 /// A tip that approaches a face, stops at a gap and turns aside.
@@ -24,8 +24,8 @@ fn near_misses_are_separated_by_refinement() {
         let foot = -0.4 * 0.25 + 0.2 * 0.25 + 0.3 * 0.5;
         let tip = |z: f64| [[0.0, 0.0, z], [0.1, 0.0, z + 1.0], [0.0, 0.1, z + 1.0]];
         let falling = [tip(2.0), tip(foot + gap)];
-        assert!(!may_collide(face, falling, &Search::default()), "{gap}");
-        assert!(may_collide(face, [tip(2.0), tip(foot - gap)], &Search::default()), "{gap}");
+        assert!(!may_collide(face, falling, &PairSearch::default()), "{gap}");
+        assert!(may_collide(face, [tip(2.0), tip(foot - gap)], &PairSearch::default()), "{gap}");
     }
 }
 
@@ -36,7 +36,7 @@ fn sliding_planes_nearer_than_a_tile_are_not_separated() {
     let a: Ends = [[[0.0, 0.0, 0.0], [1.0, 0.0, 0.3], [0.0, 1.0, 0.6]]; 2];
     let apart = |gap: f64| {
         let slid = |by: f64| a[0].map(|[x, y, z]| [x + by, y, z + 0.3 * by + gap]);
-        !may_collide(a, [slid(0.0), slid(0.5)], &Search::default())
+        !may_collide(a, [slid(0.0), slid(0.5)], &PairSearch::default())
     };
     assert!(apart(0.1) && !apart(1e-5));
 }

@@ -4,7 +4,7 @@ use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 
 use flate2::read::GzDecoder;
-use workloads::collision::{Object, Search, components, detect};
+use workloads::collision::{Object, PairSearch, components, detect};
 use workloads::visibility::load_mts;
 
 use super::{SEARCHES, may_collide};
@@ -74,7 +74,7 @@ fn no_public_query_is_missed() {
 #[cfg_attr(not(collision_data), ignore = "no folder ccd beside QUINTILE_SCENES")]
 fn public_scenes_keep_every_pair_that_collides() {
     let folder = public();
-    let search = Search { resolution: 32, bins: 4, ..Search::default() };
+    let search = PairSearch { resolution: 32, bins: 4, ..PairSearch::default() };
     for (name, objects, colliding) in [
         ("cloth-ball", 2, 0),
         ("cloth-funnel", 4, 0),

@@ -2,10 +2,11 @@
 
 use rayon::prelude::*;
 use workloads::collision::families::{Case, reference_cases, triangles_boxes_touch};
-use workloads::collision::{Method, Object, Search, candidates, detect};
+use workloads::collision::{CollisionMethod, Object, PairSearch, candidates, detect};
 
 /// A single search with 128 tiles.
-const ONCE: Search = Search { resolution: 128, bins: 1, method: Method::FragmentBox, zoom: false };
+const ONCE: PairSearch =
+    PairSearch { resolution: 128, bins: 1, method: CollisionMethod::FragmentBox, zoom: false };
 
 /// Cases of each kind of two objects.
 const PAIRS: usize = 30;
@@ -27,7 +28,7 @@ fn apart<'a>(cases: impl Iterator<Item = &'a Case>) -> (Vec<Pair<'a>>, usize) {
     (near, count)
 }
 
-fn kept(pairs: &[Pair<'_>], search: &Search) -> usize {
+fn kept(pairs: &[Pair<'_>], search: &PairSearch) -> usize {
     let may = |pair: &&Pair<'_>| {
         let found = detect(&pair.map(Clone::clone), search);
         found.iter().any(|answer| answer.verdict.may_collide())
@@ -44,16 +45,16 @@ fn below_limits(many: bool, limits: [(u32, f64); 3]) {
     let triangles = near.iter().filter(|[a, b]| triangles_boxes_touch(a, b)).count();
     println!("{count} do not collide");
     println!("boxes of objects {:.4}, of triangles {:.4}", share(near.len()), share(triangles));
-    let depth_only = Search { method: Method::DepthOnly, ..ONCE };
+    let depth_only = PairSearch { method: CollisionMethod::DepthOnly, ..ONCE };
     println!("depth only {:.4}", share(kept(&near, &depth_only)));
-    let closer = share(kept(&near, &Search::default()));
+    let closer = share(kept(&near, &PairSearch::default()));
     println!("looking closer {closer:.4}");
     for (bins, limit) in limits {
-        let share = share(kept(&near, &Search { bins, ..ONCE }));
+        let share = share(kept(&near, &PairSearch { bins, ..ONCE }));
         println!("{bins} bins {share:.4}");
         // One bin must be better than the reference rate; more bins may equal it.
         assert!(share < limit || bins > 1 && share == limit, "{bins} bins");
-        assert!(bins > Search::default().bins || closer <= limit, "looking closer");
+        assert!(bins > PairSearch::default().bins || closer <= limit, "looking closer");
     }
 }
 

@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 use workloads::collision::families::{Case, reference_cases};
-use workloads::collision::{Object, Search};
+use workloads::collision::{Object, PairSearch};
 
 use super::objects_may_collide;
 
@@ -11,12 +11,12 @@ type Known = ([Object; 2], bool);
 
 /// Checks that pairs kept with refinement are kept without. Returns how many are kept, and how many of them
 /// are apart.
-fn kept(pairs: &[Known], search: Search) -> [usize; 2] {
+fn kept(pairs: &[Known], search: PairSearch) -> [usize; 2] {
     let kept = |(number, (pair, collides)): (usize, &Known)| {
         let refined = objects_may_collide(pair, &search);
         assert!(refined || !collides, "the contact of pair {number} is lost: {search:?}");
         if refined && !collides {
-            let unrefined = objects_may_collide(pair, &Search { zoom: false, ..search });
+            let unrefined = objects_may_collide(pair, &PairSearch { zoom: false, ..search });
             assert!(unrefined, "pair {number} is kept by refinement alone: {search:?}");
         }
         [refined, refined && !collides].map(usize::from)
@@ -35,7 +35,7 @@ fn reference_pairs(each: usize) -> Vec<Known> {
 #[test]
 fn refinement_keeps_no_reference_pair_that_a_single_search_separates() {
     let pairs: Vec<Known> = reference_pairs(30).into_iter().step_by(3).collect();
-    let [kept, apart] = kept(&pairs, Search::default());
+    let [kept, apart] = kept(&pairs, PairSearch::default());
     println!("{kept} pairs are kept, {apart} of them do not collide");
     assert!(apart > 0 && apart < kept);
 }

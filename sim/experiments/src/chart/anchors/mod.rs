@@ -26,7 +26,7 @@ use workloads::material::SurfaceShader;
 use workloads::{Light, Material};
 
 use super::quantiles;
-use crate::study::table::{Sheet, Table, plain};
+use crate::study::table::{Sheet, TableBuilder, plain};
 use crate::study::{Gallery, Study, StudyError};
 
 /// Largest median and single error that are aimed at, percent.
@@ -116,7 +116,7 @@ impl Study for AnchorsChart {
         };
         let median = verdict("median", self.median_percent, MEDIAN_PERCENT);
         let worst = verdict("worst", self.worst_percent, WORST_PERCENT);
-        let rows = Table::of(&self.rows)
+        let rows = TableBuilder::of(&self.rows)
             .column("part", "part", |row| row.part, plain)
             .column("quantity", "quantity", |row| row.quantity, plain)
             .column("unit", "unit", |row| row.unit.clone(), plain)

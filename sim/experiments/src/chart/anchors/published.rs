@@ -33,7 +33,7 @@ pub(super) enum Unit {
 }
 
 impl Unit {
-    /// Its name.
+    /// Name of the unit.
     pub fn name(self) -> String {
         match self {
             Self::Giga(what) => format!("G{what}/s"),
@@ -66,7 +66,7 @@ pub(super) enum Part {
 }
 
 impl Part {
-    /// Its name.
+    /// Name of the part.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Hd7970 => "HD 7970",
@@ -79,7 +79,7 @@ impl Part {
         }
     }
 
-    /// Its GPU file.
+    /// The part as a GPU file.
     pub fn gpu(self) -> Result<GpuSpec, GpuError> {
         let (file, text) = match self {
             Self::Hd7970 => return GpuSpec::load("discrete"),

@@ -10,13 +10,13 @@ use run::{Plan, RunOptions, frames_of};
 use serde::Serialize;
 use workloads::caustics::generator::Ocean;
 use workloads::caustics::{
-    Beam, Eye, Floor, Light, MIN_SQUARES_PER_WAVE, Method, Picture, Squares, accuracy_warnings, crossing,
-    draw, error,
+    Beam, BeamMethod, DrawnLight, Eye, Floor, LightPicture, MIN_SQUARES_PER_WAVE, Squares, accuracy_warnings,
+    crossing, draw, error,
 };
 use workloads::job::OptionSource;
 use workloads::scene::Overrides;
 
-use super::{CausticsChart, CausticsEffort, CausticsRow, Coarse, KEYS};
+use super::{CausticsChart, CausticsEffort, CausticsRow, CoarseSurface, KEYS};
 use crate::study::StudyError;
 
 /// Slopes of the oceans that get coarser.
@@ -29,7 +29,7 @@ pub struct OceanCounts {
     pub volumes: usize,
     /// Pixels of the image.
     pub size: [u32; 2],
-    /// Shader executions by method, in the order of [`Method::ALL`].
+    /// Shader executions by method, in the order of [`BeamMethod::ALL`].
     pub executions: [u64; 4],
     /// Pictures drawn.
     pub draws: u64,
@@ -54,7 +54,7 @@ pub fn ocean(
     let water = Ocean { depth_m, ..water(cells, slope) };
     let (beams, eye) = (water.beams(0.0), aside_of(depth_m, size)?);
     let bar = progress.bar("ocean", 4);
-    let pictures = Method::ALL.map(|method| {
+    let pictures = BeamMethod::ALL.map(|method| {
         let picture = draw(&beams, &eye, method, None);
         bar.inc();
         picture
@@ -62,7 +62,7 @@ pub fn ocean(
     Ok(OceanCounts {
         volumes: beams.len(),
         size,
-        executions: pictures.each_ref().map(Picture::total_runs),
+        executions: pictures.each_ref().map(LightPicture::total_runs),
         draws: pictures.len() as u64,
         most: pictures.each_ref().map(|picture| picture.runs.iter().copied().max().unwrap_or(0)),
         runs: pictures.map(|picture| picture.runs).into(),
@@ -87,7 +87,7 @@ pub(super) fn measure(effort: CausticsEffort, progress: &Progress) -> Result<Cau
     let crossed = crossed(&effort, &bar)?;
     let mut frames = Vec::new();
     for &slope in effort.frame_slopes {
-        for place in 0..Method::ALL.len() {
+        for place in 0..BeamMethod::ALL.len() {
             frames.push(frame(&effort, slope, place)?);
             bar.inc();
         }
@@ -101,7 +101,7 @@ pub struct MethodFrame {
     /// Root mean square of the slope of the surface.
     pub slope: f64,
     /// How beams are bounded.
-    pub method: Method,
+    pub method: BeamMethod,
     /// Triangles drawn.
     pub triangles: usize,
     /// Pixels tested.
@@ -130,7 +130,7 @@ fn frame(effort: &CausticsEffort, slope: f64, place: usize) -> Result<MethodFram
     let cost = frames[0].cost();
     Ok(MethodFrame {
         slope,
-        method: Method::ALL[place],
+        method: BeamMethod::ALL[place],
         triangles: frames[0].triangles,
         tests: counts[Event::SamplesTested],
         executions: counts[Event::SamplesHit],
@@ -148,12 +148,12 @@ fn by_method(
     bar: &Bar,
 ) -> Result<Vec<CausticsRow>, StudyError> {
     let (beams, eye) = (water(effort.sweep_cells, slope).beams(0.0), aside(effort.sweep_px)?);
-    let ours = draw(&beams, &eye, Method::Moving, Some(Light::Volume));
+    let ours = draw(&beams, &eye, BeamMethod::Moving, Some(DrawnLight::Volume));
     let crossing = crossing(&beams);
     let row = |method| {
         let once = || {
             let start = ThreadTime::now();
-            let picture = draw(&beams, &eye, method, Some(Light::Volume));
+            let picture = draw(&beams, &eye, method, Some(DrawnLight::Volume));
             (start.elapsed().as_secs_f64(), picture)
         };
         let mut runs = thread
@@ -171,12 +171,12 @@ fn by_method(
             cpu_s: *cpu_s,
         }
     };
-    Ok(Method::ALL.map(row).into())
+    Ok(BeamMethod::ALL.map(row).into())
 }
 
 /// One surface of fewer and fewer triangles against photons that are refracted at the waves themselves: the
 /// light on the floor.
-fn by_cells(effort: &CausticsEffort, slope: f64, bar: &Bar) -> Result<Vec<Coarse>, StudyError> {
+fn by_cells(effort: &CausticsEffort, slope: f64, bar: &Bar) -> Result<Vec<CoarseSurface>, StudyError> {
     let eye = above(effort.floor_px)?;
     let squares = Squares { eye: &eye, side_px: SQUARE_PX };
     let floor = Floor { height_m: -DEPTH_M };
@@ -187,11 +187,11 @@ fn by_cells(effort: &CausticsEffort, slope: f64, bar: &Bar) -> Result<Vec<Coarse
     let row = |&cells: &u32| {
         let surface = surface(cells);
         let beams = surface.beams(0.0);
-        let found = draw(&beams, &eye, Method::Moving, Some(Light::Floor(floor))).light;
+        let found = draw(&beams, &eye, BeamMethod::Moving, Some(DrawnLight::Floor(floor))).light;
         bar.inc();
         let warned = !accuracy_warnings(&surface, &beams).is_empty();
         let error = error(&squares.of_image(&found), &known);
-        Coarse { cells, slope, crossing: crossing(&beams), error, noise, warned }
+        CoarseSurface { cells, slope, crossing: crossing(&beams), error, noise, warned }
     };
     Ok(effort.coarse_cells.iter().map(row).collect())
 }
@@ -222,7 +222,7 @@ pub struct Crossed {
     /// Mean difference of the light on the floor from photons refracted at the waves themselves, as a part of
     /// its mean.
     pub floor_error: f64,
-    /// That of other photons of that kind.
+    /// Error of other photons of that kind.
     pub noise: f64,
     /// Mean difference of the light in the volume from photons through the same triangles, as a part of its mean.
     pub volume_error: f64,
@@ -230,11 +230,11 @@ pub struct Crossed {
     pub missing: f64,
     /// The part of the light in the volume that the refined bound without cuts loses.
     pub lost: f64,
-    /// Shader executions by method, in the order of [`Method::ALL`].
+    /// Shader executions by method, in the order of [`BeamMethod::ALL`].
     pub executions: [u64; 4],
     /// The share of them that finds light, likewise.
     pub useful: [f64; 4],
-    /// Largest difference of a pixel from the image of the moving triangles, by any method of [`Method::ALL`].
+    /// Largest difference of a pixel from the image of the moving triangles, by any method of [`BeamMethod::ALL`].
     pub difference: f64,
     /// Whether the run warns of crossed sides.
     pub warned: bool,
@@ -280,10 +280,11 @@ impl Bench {
     fn row(&self, pleat: f64) -> Crossed {
         let surface = Ocean { pleat, ..self.surface.clone() };
         let beams = surface.beams(0.0);
-        let pictures = Method::ALL.map(|method| draw(&beams, &self.aside, method, Some(Light::Volume)));
+        let pictures =
+            BeamMethod::ALL.map(|method| draw(&beams, &self.aside, method, Some(DrawnLight::Volume)));
         let ours = &pictures[0];
-        let uncut = draw(&beams, &self.aside, Method::Uncut, Some(Light::Volume));
-        let sum = |picture: &Picture| picture.light.iter().sum::<f64>();
+        let uncut = draw(&beams, &self.aside, BeamMethod::Uncut, Some(DrawnLight::Volume));
+        let sum = |picture: &LightPicture| picture.light.iter().sum::<f64>();
         let (volume_error, missing) = self.volume(&beams, ours);
         Crossed {
             cells: surface.cells,
@@ -294,8 +295,8 @@ impl Bench {
             volume_error,
             missing,
             lost: 1.0 - sum(&uncut) / sum(ours),
-            executions: pictures.each_ref().map(Picture::total_runs),
-            useful: pictures.each_ref().map(Picture::useful_share),
+            executions: pictures.each_ref().map(LightPicture::total_runs),
+            useful: pictures.each_ref().map(LightPicture::useful_share),
             difference: pictures.iter().map(|other| ours.farthest(other)).fold(0.0, f64::max),
             warned: accuracy_warnings(&surface, &beams)
                 .iter()
@@ -305,12 +306,12 @@ impl Bench {
 
     fn floor_error(&self, beams: &[Beam]) -> f64 {
         let squares = Squares { eye: &self.above, side_px: SQUARE_PX };
-        let image = draw(beams, &self.above, Method::Moving, Some(Light::Floor(floor())));
+        let image = draw(beams, &self.above, BeamMethod::Moving, Some(DrawnLight::Floor(floor())));
         error(&squares.of_image(&image.light), &self.known[0])
     }
 
     /// The error of the light in the volume, and the part of it that is missing.
-    fn volume(&self, beams: &[Beam], ours: &Picture) -> (f64, f64) {
+    fn volume(&self, beams: &[Beam], ours: &LightPicture) -> (f64, f64) {
         let squares = Squares { eye: &self.aside, side_px: SQUARE_PX };
         let (found, photons) =
             (squares.of_image(&ours.light), squares.in_volume(beams, (PHOTONS / beams.len()) as u32));

@@ -4,12 +4,12 @@
 pub(crate) mod measure;
 
 use output::OutputError;
-use output::plot::{ChartPanel, HeatMapPlot, HeatTile, Picture, PlotStyle, Scale, Series, Shading};
+use output::plot::{ChartPanel, HeatMapPlot, HeatScale, HeatTile, Picture, PlotStyle, Scale, Series};
 use output::terminal::Progress;
 use serde::Serialize;
-use workloads::caustics::{MAX_CROSSED_SHARE, Method};
+use workloads::caustics::{BeamMethod, MAX_CROSSED_SHARE};
 
-use crate::study::table::{Sheet, Table, count, fixed, millis, plain};
+use crate::study::table::{Sheet, TableBuilder, count, fixed, millis, plain};
 use crate::study::{Gallery, Study, StudyError};
 
 pub use measure::{Crossed, MethodFrame, OceanCounts, ocean};
@@ -31,7 +31,7 @@ pub struct CausticsEffort {
     pub coarse_cells: &'static [u32],
     /// Squares along a side of oceans whose triangles are pleated along the light.
     pub pleated_cells: &'static [u32],
-    /// Their pleats.
+    /// Pleats of the pleated oceans.
     pub pleats: &'static [f64],
     /// Photons across and down that surfaces are compared with.
     pub rays: u32,
@@ -55,7 +55,7 @@ pub struct CausticsRow {
     /// For how much of their length sides of beams cross.
     pub crossing: f64,
     /// How beams are bounded.
-    pub method: Method,
+    pub method: BeamMethod,
     /// Shader executions.
     pub executions: u64,
     /// The share of them that finds light.
@@ -68,7 +68,7 @@ pub struct CausticsRow {
 
 /// A surface made of fewer and fewer triangles.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Coarse {
+pub struct CoarseSurface {
     /// Squares along a side.
     pub cells: u32,
     /// Root mean square of the slope of the surface.
@@ -77,7 +77,7 @@ pub struct Coarse {
     pub crossing: f64,
     /// Mean difference from photons refracted at the waves themselves, as a part of its mean.
     pub error: f64,
-    /// That of other photons of that kind.
+    /// Error of other photons of that kind.
     pub noise: f64,
     /// Whether the run warns.
     pub warned: bool,
@@ -95,16 +95,16 @@ pub struct CausticsChart {
     /// By slope and method.
     pub rows: Vec<CausticsRow>,
     /// By slope and number of triangles.
-    pub coarse: Vec<Coarse>,
+    pub coarse: Vec<CoarseSurface>,
     /// By number of triangles and pleat.
     pub crossed: Vec<Crossed>,
     /// On the reference GPU, by slope and method.
     pub frames: Vec<MethodFrame>,
 }
 
-/// Short names of the methods, in the order of [`Method::ALL`].
+/// Short names of the methods, in the order of [`BeamMethod::ALL`].
 const KEYS: [&str; 4] = ["moving", "refined", "hull", "prism"];
-/// Names of the maps of the methods, in the order of [`Method::ALL`].
+/// Names of the maps of the methods, in the order of [`BeamMethod::ALL`].
 const MAPS: [&str; 4] =
     ["caustics_map_moving", "caustics_map_refined", "caustics_map_hull", "caustics_map_prism"];
 
@@ -173,34 +173,34 @@ impl Study for CausticsChart {
             self.effort.rays * self.effort.rays
         );
         to.chart("caustics_failures", [title, &subject], panels(self))?;
-        let mut maps = Method::ALL.into_iter().zip(MAPS);
+        let mut maps = BeamMethod::ALL.into_iter().zip(MAPS);
         maps.try_for_each(|(method, stem)| to.add(stem, &self.ocean.map(method, to.plot_style())))
     }
 
     fn tables(&self) -> Vec<Sheet> {
         let (ocean, yes_no) = (&self.ocean, |yes: bool| if yes { "yes" } else { "no" }.to_owned());
         let pixels = f64::from(ocean.size[0] * ocean.size[1]);
-        let methods = Table::of(Method::ALL.into_iter().enumerate())
+        let methods = TableBuilder::of(BeamMethod::ALL.into_iter().enumerate())
             .shown("ocean", |(_, method)| method.name(), plain)
             .shown("executions", |(place, _)| ocean.executions[*place], count)
             .shown("a pixel", |(place, _)| ocean.executions[*place] as f64 / pixels, fixed(1))
             .shown("most", |(place, _)| ocean.most[*place], count)
             .shown("of the prism's", |(place, _)| ocean.of_the_prism(*place), fixed(3))
             .before(format!("{} volumes\n", ocean.volumes));
-        let sweep = Table::of(&self.rows)
+        let sweep = TableBuilder::of(&self.rows)
             .shown("slope", |row| row.slope, plain)
             .shown("crossed", |row| row.crossing, fixed(4))
             .shown("method", |row| row.method.name(), plain)
             .shown("executions", |row| row.executions, count)
             .shown("find light", |row| row.useful, fixed(3))
             .shown("CPU ms", |row| row.cpu_s, millis(1));
-        let coarse = Table::of(&self.coarse)
+        let coarse = TableBuilder::of(&self.coarse)
             .shown("slope", |row| row.slope, plain)
             .shown("cells", |row| row.cells, plain)
             .shown("crossed", |row| row.crossing, fixed(4))
             .shown("error", |row| row.error, fixed(3))
             .shown("warns", |row| row.warned, yes_no);
-        let mut crossed = Table::of(&self.crossed)
+        let mut crossed = TableBuilder::of(&self.crossed)
             .shown("cells", |row| row.cells, plain)
             .shown("pleat", |row| row.pleat, plain)
             .shown("crossed", |row| row.crossing, fixed(4))
@@ -213,7 +213,7 @@ impl Study for CausticsChart {
             crossed = crossed.shown(method, |row| row.useful[place], fixed(3));
         }
         let crossed = crossed.shown("warns", |row| row.warned, yes_no).after("\n");
-        let frames = Table::of(&self.frames)
+        let frames = TableBuilder::of(&self.frames)
             .column("slope", "slope", |row| row.slope, plain)
             .column("method", "method", |row| row.method.name(), plain)
             .column("triangles", "triangles", |row| row.triangles as u64, count)
@@ -253,7 +253,7 @@ struct Line {
 
 impl Line {
     fn of_slope(row: &CausticsRow, cells: u32) -> Self {
-        let place = Method::ALL.iter().position(|method| *method == row.method).unwrap_or(0);
+        let place = BeamMethod::ALL.iter().position(|method| *method == row.method).unwrap_or(0);
         Self {
             sweep: "slope",
             slope_or_pleat: row.slope,
@@ -268,7 +268,7 @@ impl Line {
         }
     }
 
-    fn of_cells(row: &Coarse) -> Self {
+    fn of_cells(row: &CoarseSurface) -> Self {
         let (sweep, method, error) = ("cells", KEYS[0], Some(row.error));
         let (slope_or_pleat, cells, crossing) = (row.slope, row.cells, row.crossing);
         Self { sweep, slope_or_pleat, cells, crossing, method, error, ..Self::default() }
@@ -295,7 +295,7 @@ impl CausticsChart {
     fn lines(&self) -> Sheet {
         let slopes = self.rows.iter().map(|row| Line::of_slope(row, self.effort.sweep_cells));
         let lines = slopes.chain(self.coarse.iter().map(Line::of_cells));
-        Table::of(lines.chain(self.crossed.iter().flat_map(Line::of_pleat)))
+        TableBuilder::of(lines.chain(self.crossed.iter().flat_map(Line::of_pleat)))
             .data("sweep", |line| line.sweep)
             .data("slope_or_pleat", |line| line.slope_or_pleat)
             .data("cells", |line| line.cells)
@@ -313,14 +313,14 @@ impl CausticsChart {
     /// Work, time and energy of a frame over the slope of the waves, by method.
     fn on_hardware(&self) -> Vec<ChartPanel> {
         let panel = |title: &str, up: &str, of: fn(&MethodFrame) -> f64| {
-            let curve = |method: Method| {
+            let curve = |method: BeamMethod| {
                 let rows = self.frames.iter().filter(move |row| row.method == method);
                 Series::curve(method.name(), rows.map(|row| (row.slope, of(row))))
             };
             ChartPanel::new(
                 title,
                 ["slope of the waves (root mean square)", up],
-                Method::ALL.map(curve).into(),
+                BeamMethod::ALL.map(curve).into(),
             )
             .on(Scale::Decades, Scale::Even)
         };
@@ -334,11 +334,11 @@ impl CausticsChart {
 
     fn costs(&self) -> Vec<ChartPanel> {
         let by_method = |of: fn(&CausticsRow) -> f64| {
-            let curve = |method: Method| {
+            let curve = |method: BeamMethod| {
                 let rows = self.rows.iter().filter(move |row| row.method == method);
                 Series::curve(method.name(), rows.map(|row| (row.slope, of(row))))
             };
-            Method::ALL.map(curve).into()
+            BeamMethod::ALL.map(curve).into()
         };
         let panel = |title: &str, up: &str, of| {
             ChartPanel::new(title, ["slope of the waves (root mean square)", up], by_method(of))
@@ -357,8 +357,8 @@ const MAP_PX: u32 = 4;
 
 impl OceanCounts {
     /// Executions of a method at every pixel (Fig. 8), in colours that are the same for all methods.
-    pub fn map(&self, method: Method, plot_style: &PlotStyle) -> Picture {
-        let place = Method::ALL.iter().position(|known| *known == method).unwrap_or(0);
+    pub fn map(&self, method: BeamMethod, plot_style: &PlotStyle) -> Picture {
+        let place = BeamMethod::ALL.iter().position(|known| *known == method).unwrap_or(0);
         let values = (0..self.runs.len()).flat_map(|place| self.tiles(place)).map(|tile| tile.value);
         HeatMapPlot {
             title: &format!("Shader executions of a pixel: {}", method.name()),
@@ -373,7 +373,7 @@ impl OceanCounts {
             label: "executions",
             size: self.size,
             tiles: &self.tiles(place),
-            shading: Shading::UpTo(values.fold(0.0, f64::max)),
+            shading: HeatScale::UpTo(values.fold(0.0, f64::max)),
             brightness: &[],
         }
         .picture(plot_style)
@@ -412,7 +412,7 @@ fn panels(chart: &CausticsChart) -> Vec<ChartPanel> {
 
 fn coarse(chart: &CausticsChart) -> ChartPanel {
     let of_slope = |slope: f64| {
-        let rows = chart.coarse.iter().filter(move |row: &&Coarse| row.slope == slope);
+        let rows = chart.coarse.iter().filter(move |row: &&CoarseSurface| row.slope == slope);
         Series::curve(format!("slope {slope}"), rows.map(|row| (f64::from(row.cells), row.error)))
     };
     let mut slopes: Vec<f64> = chart.coarse.iter().map(|row| row.slope).collect();
@@ -460,11 +460,11 @@ fn lost(chart: &CausticsChart) -> ChartPanel {
 /// Panel of the useful share of each bounding volume, at the largest number of triangles.
 fn useful(chart: &CausticsChart) -> ChartPanel {
     let most = chart.effort.pleated_cells.last().copied().unwrap_or(0);
-    let of = |(place, method): (usize, Method)| {
+    let of = |(place, method): (usize, BeamMethod)| {
         let rows = chart.crossed.iter().filter(move |row| row.cells == most);
         Series::curve(method.name(), rows.map(move |row| (100.0 * row.crossing, row.useful[place])))
     };
-    let curves = Method::ALL.into_iter().enumerate().map(of).collect();
+    let curves = BeamMethod::ALL.into_iter().enumerate().map(of).collect();
     let title = format!("use, {most} squares along a side");
     over_crossing(&title, "share of executions that find light", curves)
 }

@@ -13,7 +13,7 @@ use workloads::compute::{
 use workloads::job::{DrawsScene, OptionSource};
 use workloads::scene::Frame;
 
-use super::{ComputeRow, Sweep};
+use super::{ComputeRow, ComputeSweep};
 
 /// Sizes of groups.
 const GROUPS: [u32; 5] = [16, 32, 64, 128, 256];
@@ -43,7 +43,7 @@ const SEED: u64 = 1;
 /// A method at a value.
 #[derive(Clone, Debug)]
 pub(super) struct Case {
-    sweep: Sweep,
+    sweep: ComputeSweep,
     value: f64,
     method: &'static str,
     options: ComputeOptions,
@@ -60,7 +60,8 @@ impl Case {
         for group in GROUPS {
             let kernels = [("reduction", &reduction), ("histogram", &histogram), ("light culling", &culling)];
             for (method, kernel) in kernels {
-                add(Sweep::Group, f64::from(group), method, ComputeOptions { group, ..kernel.clone() });
+                let options = ComputeOptions { group, ..kernel.clone() };
+                add(ComputeSweep::Group, f64::from(group), method, options);
             }
         }
         let layouts = [
@@ -73,7 +74,7 @@ impl Case {
             for (method, order, padded) in layouts {
                 let options =
                     ComputeOptions { stride, order, padded, group: STRIDE_GROUP, ..reduction.clone() };
-                add(Sweep::Stride, f64::from(stride), method, options);
+                add(ComputeSweep::Stride, f64::from(stride), method, options);
             }
         }
         let places = [
@@ -91,24 +92,20 @@ impl Case {
                     padded,
                     ..histogram.clone()
                 };
-                add(Sweep::Contrast, contrast, method, options);
+                add(ComputeSweep::Contrast, contrast, method, options);
             }
         }
         for step in STEPS {
             for (method, kernel) in [("reduction", &reduction), ("histogram", &histogram)] {
-                add(Sweep::Step, f64::from(step), method, ComputeOptions { step, ..kernel.clone() });
+                add(ComputeSweep::Step, f64::from(step), method, ComputeOptions { step, ..kernel.clone() });
             }
         }
-        add(
-            Sweep::Step,
-            1.0,
-            CHAIN_METHOD,
-            ComputeOptions { kernel: Kernel::MipChain, ..ComputeOptions::default() },
-        );
+        let chain = ComputeOptions { kernel: Kernel::MipChain, ..ComputeOptions::default() };
+        add(ComputeSweep::Step, 1.0, CHAIN_METHOD, chain);
         for tile_px in TILES {
             for (method, depth_bounds) in [("depth bounds", true), ("frustum", false)] {
                 let options = ComputeOptions { tile_px, depth_bounds, ..culling.clone() };
-                add(Sweep::Tile, f64::from(tile_px), method, options);
+                add(ComputeSweep::Tile, f64::from(tile_px), method, options);
             }
         }
         cases
@@ -169,19 +166,19 @@ impl Bench {
         let (options, frame) = (&case.options, &self.frame);
         let job = job(options, self.size)?;
         Ok(match (case.sweep, options.kernel) {
-            (Sweep::Step, Kernel::Reduction) => {
+            (ComputeSweep::Step, Kernel::Reduction) => {
                 let mean = found(&job, &self.gpu, frame, options, |kernels, image| {
                     let mean = kernels.mean_luminance(image)?;
                     Ok(f64::from(kernels.values(mean)[0]))
                 })?;
                 Some((mean / self.mean - 1.0).abs())
             }
-            (Sweep::Step, Kernel::MipChain) => {
+            (ComputeSweep::Step, Kernel::MipChain) => {
                 let mut gpu = Gpu::without_packets(&self.gpu.pipeline)?;
                 let chain = job.chain(frame, &mut gpu)?;
                 Some((f64::from(chain.mean) / self.mean - 1.0).abs())
             }
-            (Sweep::Step, _) => {
+            (ComputeSweep::Step, _) => {
                 let other = histogram(&job, &self.gpu, frame, options)?;
                 let share = |bins: &[u32]| {
                     let all = f64::from(bins.iter().sum::<u32>());
@@ -190,7 +187,7 @@ impl Bench {
                 let pairs = share(&self.histogram).into_iter().zip(share(&other));
                 Some(0.5 * pairs.map(|(a, b)| (a - b).abs()).sum::<f64>())
             }
-            (Sweep::Tile, _) => Some(self.wasted(&self.lists(&job, options)?, options.tile_px)),
+            (ComputeSweep::Tile, _) => Some(self.wasted(&self.lists(&job, options)?, options.tile_px)),
             _ => None,
         })
     }

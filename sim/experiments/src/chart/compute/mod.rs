@@ -4,13 +4,13 @@
 mod measure;
 
 use output::OutputError;
-use output::plot::{AxisSpec, ChartPanel, Mark, Paint, Scale, Series};
+use output::plot::{AxisSpec, ChartPanel, Paint, PlotMark, Scale, Series};
 use output::terminal::Progress;
 use rayon::prelude::*;
 use run::RunError;
 use serde::Serialize;
 
-use crate::study::table::{Sheet, Table, count, fixed, optional, plain};
+use crate::study::table::{Sheet, TableBuilder, count, fixed, optional, plain};
 use crate::study::tradeoff::{Metric, TradeoffPoint};
 use crate::study::{Gallery, Study, StudyError};
 use measure::{Bench, CHAIN_METHOD, Case};
@@ -25,7 +25,7 @@ pub struct ComputeEffort {
 /// What changes along a sweep.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Sweep {
+pub enum ComputeSweep {
     /// Lanes of a group.
     Group,
     /// Words from the value of a lane to that of the next.
@@ -38,7 +38,7 @@ pub enum Sweep {
     Tile,
 }
 
-impl Sweep {
+impl ComputeSweep {
     const fn name(self) -> &'static str {
         match self {
             Self::Group => "group",
@@ -54,8 +54,8 @@ impl Sweep {
 #[derive(Clone, Debug, Serialize)]
 pub struct ComputeRow {
     /// What changes.
-    pub sweep: Sweep,
-    /// Its value.
+    pub sweep: ComputeSweep,
+    /// Value of the varied setting.
     pub value: f64,
     /// The method.
     pub method: &'static str,
@@ -105,23 +105,28 @@ impl Study for ComputeChart {
 
     fn draw(&self, to: &Gallery<'_>) -> Result<(), OutputError> {
         let panels = vec![
-            self.panel(Sweep::Group, "lanes of a group", Scale::Doublings, None),
-            self.panel(Sweep::Stride, "words between the sums of lanes", Scale::Doublings, Some(16.0..32.0)),
-            self.panel(Sweep::Contrast, "contrast of the image", Scale::Even, Some(0.0..0.02)),
+            self.panel(ComputeSweep::Group, "lanes of a group", Scale::Doublings, None),
+            self.panel(
+                ComputeSweep::Stride,
+                "words between the sums of lanes",
+                Scale::Doublings,
+                Some(16.0..32.0),
+            ),
+            self.panel(ComputeSweep::Contrast, "contrast of the image", Scale::Even, Some(0.0..0.02)),
         ];
         let [width, height] = [self.effort.size.0, self.effort.size.1];
         let subject =
             format!("passes of groups of a frame of {width} x {height} pixels on the GPU reference");
         to.chart("compute", ["Cost of programs of groups", &subject], panels)?;
         let errors = vec![
-            self.error_panel(Sweep::Step, "error (%)"),
-            self.error_panel(Sweep::Tile, "wasted lights (%)"),
+            self.error_panel(ComputeSweep::Step, "error (%)"),
+            self.error_panel(ComputeSweep::Tile, "wasted lights (%)"),
         ];
         to.chart("compute_error", ["Error over cost of programs of groups", &subject], errors)
     }
 
     fn tables(&self) -> Vec<Sheet> {
-        let rows = Table::of(&self.rows)
+        let rows = TableBuilder::of(&self.rows)
             .column("sweep", "sweep", |row| row.sweep.name(), plain)
             .column("value", "value", |row| row.value, plain)
             .column("method", "method", |row| row.method, plain)
@@ -160,7 +165,7 @@ impl Study for ComputeChart {
 impl ComputeRow {
     fn subject(&self) -> &'static str {
         match (self.sweep, self.method) {
-            (Sweep::Tile, _) => "lights of tiles",
+            (ComputeSweep::Tile, _) => "lights of tiles",
             (_, "reduction" | CHAIN_METHOD) => "mean luminance",
             _ => "histogram of luminance",
         }
@@ -168,7 +173,7 @@ impl ComputeRow {
 
     fn error_name(&self) -> &'static str {
         match (self.sweep, self.method) {
-            (Sweep::Tile, _) => "lights in lists that reach nothing",
+            (ComputeSweep::Tile, _) => "lights in lists that reach nothing",
             (_, "reduction" | CHAIN_METHOD) => "error of the mean luminance",
             _ => "wrong shares of the histogram",
         }
@@ -176,15 +181,17 @@ impl ComputeRow {
 
     /// Whether all lanes of a warp are on one bin, or on one bank.
     fn is_broken(&self) -> bool {
-        let one_bin = self.sweep == Sweep::Contrast && self.value == 0.0 && !self.method.contains("padded");
-        let one_bank = self.sweep == Sweep::Stride && self.value == 32.0 && self.method == "sequential";
+        let one_bin =
+            self.sweep == ComputeSweep::Contrast && self.value == 0.0 && !self.method.contains("padded");
+        let one_bank =
+            self.sweep == ComputeSweep::Stride && self.value == 32.0 && self.method == "sequential";
         one_bin || one_bank
     }
 }
 
 impl ComputeChart {
     /// Rows of each method of a sweep, in the order of the first.
-    fn methods(&self, sweep: Sweep) -> Vec<(&'static str, Vec<&ComputeRow>)> {
+    fn methods(&self, sweep: ComputeSweep) -> Vec<(&'static str, Vec<&ComputeRow>)> {
         let mut methods: Vec<(&'static str, Vec<&ComputeRow>)> = Vec::new();
         for row in self.rows.iter().filter(|row| row.sweep == sweep) {
             match methods.iter_mut().find(|(name, _)| *name == row.method) {
@@ -197,14 +204,14 @@ impl ComputeChart {
 
     fn panel(
         &self,
-        sweep: Sweep,
+        sweep: ComputeSweep,
         across: &str,
         scale: Scale,
         failing: Option<std::ops::Range<f64>>,
     ) -> ChartPanel {
         let curve = |(number, (method, rows)): (usize, (&'static str, Vec<&ComputeRow>))| {
             let points = rows.iter().map(|row| (row.value, row.cycles)).collect();
-            Series::new(method, Mark::Curve(points)).painted(Paint::Like(number))
+            Series::new(method, PlotMark::Curve(points)).painted(Paint::Like(number))
         };
         let axes = [
             AxisSpec { name: across.to_owned(), scale, ..AxisSpec::default() },
@@ -214,11 +221,11 @@ impl ComputeChart {
         ChartPanel::over("", axes, series).failing(failing, "fails")
     }
 
-    fn error_panel(&self, sweep: Sweep, up: &str) -> ChartPanel {
+    fn error_panel(&self, sweep: ComputeSweep, up: &str) -> ChartPanel {
         let curve = |(number, (method, rows)): (usize, (&'static str, Vec<&ComputeRow>))| {
             let point = |row: &&ComputeRow| Some((row.cycles, row.error_percent?, format!("{}", row.value)));
             let points = rows.iter().filter_map(point).collect();
-            Series::new(method, Mark::Dots(points)).painted(Paint::Like(number))
+            Series::new(method, PlotMark::Dots(points)).painted(Paint::Like(number))
         };
         let axes = [
             AxisSpec { name: "cycles".to_owned(), ..AxisSpec::default() },
@@ -238,29 +245,31 @@ mod tests {
     fn conflicts_cost_cycles_and_exact_methods_have_no_error() {
         let (_folder, chart, done) = written::<ComputeChart>(ComputeEffort { size: (96, 54) });
         assert_eq!(done.fault, None);
-        let row = |sweep: Sweep, method: &str, value: f64| {
+        let row = |sweep: ComputeSweep, method: &str, value: f64| {
             let is_it = |row: &&ComputeRow| row.sweep == sweep && row.method == method && row.value == value;
             chart.rows.iter().find(is_it).unwrap()
         };
-        let [one, many] = [1.0, 32.0].map(|stride| row(Sweep::Stride, "sequential", stride));
+        let [one, many] = [1.0, 32.0].map(|stride| row(ComputeSweep::Stride, "sequential", stride));
         assert!(one.conflicts == 0 && many.conflicts > 0 && many.cycles > one.cycles, "{one:?} {many:?}");
-        assert_eq!(row(Sweep::Stride, "sequential, padded", 32.0).conflicts, 0);
-        let [spread, flat] = [1.0, 0.0].map(|contrast| row(Sweep::Contrast, "global", contrast));
+        assert_eq!(row(ComputeSweep::Stride, "sequential, padded", 32.0).conflicts, 0);
+        let [spread, flat] = [1.0, 0.0].map(|contrast| row(ComputeSweep::Contrast, "global", contrast));
         assert!(
             flat.conflicts > spread.conflicts && flat.warns == ["atomic-contention"],
             "{spread:?} {flat:?}"
         );
         for method in ["reduction", "histogram"] {
-            assert_eq!(row(Sweep::Step, method, 1.0).error_percent, Some(0.0), "{method}");
-            assert!(row(Sweep::Step, method, 8.0).error_percent > Some(0.0), "{method}");
-            assert!(row(Sweep::Step, method, 8.0).cycles < row(Sweep::Step, method, 1.0).cycles);
+            assert_eq!(row(ComputeSweep::Step, method, 1.0).error_percent, Some(0.0), "{method}");
+            assert!(row(ComputeSweep::Step, method, 8.0).error_percent > Some(0.0), "{method}");
+            assert!(
+                row(ComputeSweep::Step, method, 8.0).cycles < row(ComputeSweep::Step, method, 1.0).cycles
+            );
         }
-        let chain = row(Sweep::Step, CHAIN_METHOD, 1.0);
+        let chain = row(ComputeSweep::Step, CHAIN_METHOD, 1.0);
         assert!(
             chain.cycles > 0.0 && chain.error_percent > Some(0.0),
             "odd sizes leave texels out: {chain:?}"
         );
-        let [with, without] = ["depth bounds", "frustum"].map(|method| row(Sweep::Tile, method, 16.0));
+        let [with, without] = ["depth bounds", "frustum"].map(|method| row(ComputeSweep::Tile, method, 16.0));
         assert!(with.error_percent < without.error_percent, "{with:?} {without:?}");
     }
 }

@@ -4,8 +4,8 @@
 use serde::Serialize;
 use traces::Trace;
 use traces::energy::{PowerIntegral, TOLERANCE_S, score, true_frames};
-use traces::frames::{FinderMethod, Marks, Options, default_window, find_with};
-use traces::synth::{HELD_OUT_DEVICES, HeldOutDevice, Scene};
+use traces::frames::{FinderMethod, FinderOptions, Marks, default_window, find_with};
+use traces::synth::{HELD_OUT_DEVICES, HeldOutDevice, SynthScene};
 
 use super::{FAILS_BELOW, HAND_S, MARKED};
 use crate::study::StudyError;
@@ -23,7 +23,7 @@ pub struct HeldOutRow {
     /// The kind of device.
     #[serde(rename = "witness")]
     pub device: &'static str,
-    /// Its seed.
+    /// Seed of the device.
     pub seed: u64,
     /// The method.
     pub method: &'static str,
@@ -88,7 +88,7 @@ fn row(
     device: &HeldOutDevice,
     seed: u64,
     method: FinderMethod,
-    scene: &Scene,
+    scene: &SynthScene,
     trace: &Trace,
 ) -> Result<HeldOutRow, StudyError> {
     let truth_s: Vec<f64> = scene.truth.iter().map(|frame| frame.start_s).collect();
@@ -98,7 +98,7 @@ fn row(
     for (share, hand_s) in MARKED.into_iter().zip(HAND_S) {
         let mark_s = truth_s[(share * truth_s.len() as f64) as usize] + hand_s;
         let marks = Marks::one(mark_s, default_window(0.0, trace.rate_hz()), trace.end_s());
-        let found = find_with(trace, &marks, &Options { method, ..Options::default() })?;
+        let found = find_with(trace, &marks, &FinderOptions { method, ..FinderOptions::default() })?;
         let frames = PowerIntegral::new(trace).frames(&found);
         f1.push(score(&frames, &scene.truth, tolerance_s).f1());
         warnings.add(f1[f1.len() - 1] >= FAILS_BELOW, !found.warnings.is_empty());

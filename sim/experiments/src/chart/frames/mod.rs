@@ -9,16 +9,16 @@ mod held_out;
 use std::time::Instant;
 
 use output::OutputError;
-use output::plot::{ChartPanel, Mark, Paint, Scale, Series};
+use output::plot::{ChartPanel, Paint, PlotMark, Scale, Series};
 use output::terminal::Progress;
 use serde::Serialize;
 use traces::Trace;
 use traces::energy::{FrameEnergy, PowerIntegral, TOLERANCE_S, score, true_frames};
-use traces::frames::{FinderMethod, Marks, Options, default_window, find_with};
-use traces::synth::{RecorderSpec, SCENARIOS, Scenario, Scene};
+use traces::frames::{FinderMethod, FinderOptions, Marks, default_window, find_with};
+use traces::synth::{RecorderSpec, SCENARIOS, Scenario, SynthScene};
 
 use self::held_out::{HeldOutRow, HeldOutSummary};
-use crate::study::table::{Sheet, Table, fixed, optional, plain, share};
+use crate::study::table::{Sheet, TableBuilder, fixed, optional, plain, share};
 use crate::study::tradeoff::{Metric, TradeoffPoint};
 use crate::study::{Gallery, Study, StudyError};
 
@@ -48,7 +48,7 @@ pub struct FramesEffort {
 /// Search for frames.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Way {
+pub enum FramesMethod {
     /// Sum of squares to one mark (Paper III).
     Squares,
     /// z-normalized distance to one mark.
@@ -61,11 +61,11 @@ pub enum Way {
     Auto,
 }
 
-impl Way {
+impl FramesMethod {
     /// All of them, in the order of their colours.
     pub const ALL: [Self; 5] = [Self::Squares, Self::Normalized, Self::Templates, Self::Tracking, Self::Auto];
 
-    /// Its name.
+    /// Name of the method.
     pub fn name(self) -> &'static str {
         match self {
             Self::Squares => "squares",
@@ -80,7 +80,7 @@ impl Way {
 /// The property that is changed; the others stay at 50 kHz, 30 dB and 14 bits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Axis {
+pub enum FramesAxis {
     /// Sampling rate, Hz.
     Rate,
     /// Signal-to-noise ratio, dB.
@@ -89,11 +89,11 @@ pub enum Axis {
     Bits,
 }
 
-impl Axis {
+impl FramesAxis {
     /// All of them.
     pub const ALL: [Self; 3] = [Self::Rate, Self::Noise, Self::Bits];
 
-    /// Its name.
+    /// Name of the axis.
     pub fn name(self) -> &'static str {
         match self {
             Self::Rate => "rate",
@@ -131,13 +131,13 @@ impl Axis {
 #[derive(Clone, Debug, Serialize)]
 pub struct FramesRow {
     /// The property that is changed.
-    pub axis: Axis,
-    /// Its value.
+    pub axis: FramesAxis,
+    /// Value on the axis.
     pub value: f64,
     /// The scene.
     pub scene: &'static str,
     /// The method.
-    pub way: Way,
+    pub way: FramesMethod,
     /// Quality of the starts found.
     #[serde(flatten)]
     pub outcome: FinderScore,
@@ -187,10 +187,10 @@ impl Study for FramesChart {
     fn measure(effort: FramesEffort, _scenes: &[String], progress: &Progress) -> Result<Self, StudyError> {
         let subjects = SCENARIOS.iter().map(|scenario| Subject::new(scenario, &effort));
         let subjects: Vec<Subject> = subjects.collect::<Result<_, _>>()?;
-        let settings = Axis::ALL.into_iter().flat_map(|axis| {
+        let settings = FramesAxis::ALL.into_iter().flat_map(|axis| {
             axis.recordings(&effort).into_iter().map(move |(value, recording)| (axis, value, recording))
         });
-        let settings: Vec<(Axis, f64, RecorderSpec)> = settings.collect();
+        let settings: Vec<(FramesAxis, f64, RecorderSpec)> = settings.collect();
         let bar = progress.bar("recordings", (settings.len() * subjects.len()) as u64);
         let mut rows = Vec::new();
         // One after another: host times are part of what is measured.
@@ -215,11 +215,11 @@ impl Study for FramesChart {
             self.effort.frames,
             self.effort.seeds.len()
         );
-        for axis in Axis::ALL {
+        for axis in FramesAxis::ALL {
             let (title, x, unit) = match axis {
-                Axis::Rate => ("Frames found over sampling rate", "sampling rate, kHz", 1e3),
-                Axis::Noise => ("Frames found over signal to noise", "signal to noise, dB", 1.0),
-                Axis::Bits => ("Frames found over resolution", "bits", 1.0),
+                FramesAxis::Rate => ("Frames found over sampling rate", "sampling rate, kHz", 1e3),
+                FramesAxis::Noise => ("Frames found over signal to noise", "signal to noise, dB", 1.0),
+                FramesAxis::Bits => ("Frames found over resolution", "bits", 1.0),
             };
             let values: Vec<String> =
                 self.values(axis).into_iter().map(|value| format!("{}", value / unit)).collect();
@@ -231,7 +231,7 @@ impl Study for FramesChart {
     }
 
     fn tables(&self) -> Vec<Sheet> {
-        let rows = Table::of(&self.rows)
+        let rows = TableBuilder::of(&self.rows)
             .data("axis", |row| row.axis.name())
             .data("value", |row| row.value)
             .data("scene", |row| row.scene)
@@ -245,7 +245,7 @@ impl Study for FramesChart {
             .data("right_flagged", |row| row.outcome.flags.right_with)
             .data("host_s_per_1e6", |row| row.outcome.host_s_per_1e6)
             .csv("frame_finding.csv");
-        let devices = Table::of(&self.held_out)
+        let devices = TableBuilder::of(&self.held_out)
             .data("witness", |row| row.device)
             .data("seed", |row| row.seed)
             .data("method", |row| row.method)
@@ -266,8 +266,8 @@ impl Study for FramesChart {
 
     /// Every method at each ratio of signal to noise, over all scenes.
     fn tradeoff(&self) -> Vec<TradeoffPoint> {
-        let at = |snr_db: f64, way: Way| {
-            let mean = |of: fn(&FinderScore) -> Option<f64>| self.mean(Axis::Noise, snr_db, way, of);
+        let at = |snr_db: f64, way: FramesMethod| {
+            let mean = |of: fn(&FinderScore) -> Option<f64>| self.mean(FramesAxis::Noise, snr_db, way, of);
             let cost = mean(|o| Some(o.host_s_per_1e6));
             let f1 =
                 mean(|o| Some(o.f1)).map(|f1| Metric::new("starts wrong or missed (1 - F1)", "", 1.0 - f1));
@@ -276,19 +276,19 @@ impl Study for FramesChart {
                 energy.map(|share| Metric::new("median error of a frame's energy", "%", 100.0 * share));
             let point = |error: Metric| {
                 let cost = Metric::new("host time of a million samples", "s", cost?);
-                let subject = format!("frames of a trace ({})", Axis::Noise.shown(snr_db));
+                let subject = format!("frames of a trace ({})", FramesAxis::Noise.shown(snr_db));
                 Some(TradeoffPoint::new(subject, [way.name(), ""], [error.beside(0.0), cost]))
             };
             [f1, energy].into_iter().flatten().filter_map(point).collect::<Vec<_>>()
         };
-        let values = self.values(Axis::Noise).into_iter();
-        values.flat_map(|snr_db| Way::ALL.map(|way| at(snr_db, way))).flatten().collect()
+        let values = self.values(FramesAxis::Noise).into_iter();
+        values.flat_map(|snr_db| FramesMethod::ALL.map(|way| at(snr_db, way))).flatten().collect()
     }
 }
 
 impl FramesChart {
     /// The values along an axis, in order.
-    fn values(&self, axis: Axis) -> Vec<f64> {
+    fn values(&self, axis: FramesAxis) -> Vec<f64> {
         let mut values: Vec<f64> =
             self.rows.iter().filter(|row| row.axis == axis).map(|row| row.value).collect();
         values.dedup();
@@ -296,79 +296,87 @@ impl FramesChart {
     }
 
     /// The rows of one method at one value, a row for each scene.
-    fn at(&self, axis: Axis, value: f64, way: Way) -> impl Iterator<Item = &FramesRow> {
+    fn at(&self, axis: FramesAxis, value: f64, way: FramesMethod) -> impl Iterator<Item = &FramesRow> {
         self.rows.iter().filter(move |row| row.axis == axis && row.value == value && row.way == way)
     }
 
     /// The mean over scenes of what each has; `None` where none has it.
-    fn mean(&self, axis: Axis, value: f64, way: Way, of: fn(&FinderScore) -> Option<f64>) -> Option<f64> {
+    fn mean(
+        &self,
+        axis: FramesAxis,
+        value: f64,
+        way: FramesMethod,
+        of: fn(&FinderScore) -> Option<f64>,
+    ) -> Option<f64> {
         let values: Vec<f64> = self.at(axis, value, way).filter_map(|row| of(&row.outcome)).collect();
         (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
     }
 
     /// A curve over the places of the values, without those at which nothing is known.
-    fn along(&self, axis: Axis, way: Way, of: fn(&FinderScore) -> Option<f64>) -> Series {
+    fn along(&self, axis: FramesAxis, way: FramesMethod, of: fn(&FinderScore) -> Option<f64>) -> Series {
         let means = self.values(axis).into_iter().map(|value| self.mean(axis, value, way, of)).enumerate();
         Series::curve(way.name(), means.filter_map(|(place, mean)| Some((place as f64, mean?))))
     }
 
     /// F1, with the line below which a method fails.
-    fn found(&self, axis: Axis) -> ChartPanel {
+    fn found(&self, axis: FramesAxis) -> ChartPanel {
         let last = self.values(axis).len().saturating_sub(1) as f64;
-        let limit = Series::new("fails below", Mark::Line(vec![(0.0, FAILS_BELOW), (last, FAILS_BELOW)]));
-        let curves = Way::ALL.into_iter().map(|way| self.along(axis, way, |o| Some(o.f1)));
+        let limit = Series::new("fails below", PlotMark::Line(vec![(0.0, FAILS_BELOW), (last, FAILS_BELOW)]));
+        let curves = FramesMethod::ALL.into_iter().map(|way| self.along(axis, way, |o| Some(o.f1)));
         let series = curves.chain([limit.painted(Paint::Ink)]).collect();
         ChartPanel::new("", ["", "F1 of starts within 0.5 ms"], series).on(Scale::Even, Scale::FromZero)
     }
 
-    fn energy(&self, axis: Axis) -> ChartPanel {
+    fn energy(&self, axis: FramesAxis) -> ChartPanel {
         let percent: fn(&FinderScore) -> Option<f64> = |o| o.energy_error.map(|error| 100.0 * error);
-        let curves = Way::ALL.into_iter().map(|way| self.along(axis, way, percent)).collect();
+        let curves = FramesMethod::ALL.into_iter().map(|way| self.along(axis, way, percent)).collect();
         ChartPanel::new("", ["", "median energy error (%)"], curves)
     }
 
     fn host_time(&self) -> ChartPanel {
-        let of = |way: Way| self.timed(way).into_iter().map(|(rate_hz, host_s, _)| (rate_hz, host_s));
+        let of =
+            |way: FramesMethod| self.timed(way).into_iter().map(|(rate_hz, host_s, _)| (rate_hz, host_s));
         let axes = ["sampling rate, Hz", "host seconds for a million samples"];
-        let curves = Way::ALL.map(|way| Series::curve(way.name(), of(way)));
+        let curves = FramesMethod::ALL.map(|way| Series::curve(way.name(), of(way)));
         ChartPanel::new("time over sampling rate", axes, curves.into())
     }
 
     fn found_over_time(&self) -> ChartPanel {
-        let curve = |way: Way| {
+        let curve = |way: FramesMethod| {
             let mut points: Vec<(f64, f64)> =
                 self.timed(way).into_iter().map(|(_, host_s, f1)| (host_s, f1)).collect();
             points.sort_by(|a, b| a.0.total_cmp(&b.0));
             Series::curve(way.name(), points)
         };
         let axes = ["host seconds for a million samples", "F1"];
-        ChartPanel::new("F1 over time, a dot for each rate", axes, Way::ALL.map(curve).into())
+        ChartPanel::new("F1 over time, a dot for each rate", axes, FramesMethod::ALL.map(curve).into())
     }
 
     /// Rate, host seconds for a million samples, and F1.
-    fn timed(&self, way: Way) -> Vec<(f64, f64, f64)> {
+    fn timed(&self, way: FramesMethod) -> Vec<(f64, f64, f64)> {
         let point = |rate_hz: f64| {
-            let mean = |of| self.mean(Axis::Rate, rate_hz, way, of);
+            let mean = |of| self.mean(FramesAxis::Rate, rate_hz, way, of);
             Some((rate_hz, mean(|o| Some(o.host_s_per_1e6))?, mean(|o| Some(o.f1))?))
         };
-        self.values(Axis::Rate).into_iter().filter_map(point).collect()
+        self.values(FramesAxis::Rate).into_iter().filter_map(point).collect()
     }
 
     /// Mean F1 by axis, value and method; a star where it fails, and on how many of the scenes it does.
     fn by_value(&self) -> Sheet {
-        let each =
-            Axis::ALL.into_iter().flat_map(|axis| self.values(axis).into_iter().map(move |at| (axis, at)));
-        let mut table = Table::of(each).shown("axis", |(axis, _)| axis.name(), plain).shown(
+        let each = FramesAxis::ALL
+            .into_iter()
+            .flat_map(|axis| self.values(axis).into_iter().map(move |at| (axis, at)));
+        let mut table = TableBuilder::of(each).shown("axis", |(axis, _)| axis.name(), plain).shown(
             "value",
             |(axis, value)| axis.shown(*value),
             plain,
         );
-        for way in Way::ALL {
+        for way in FramesMethod::ALL {
             table = table.shown(way.name(), |(axis, value)| self.cell(*axis, *value, way), plain);
         }
-        let energy = |axis, value| self.mean(axis, value, Way::Auto, |o| o.energy_error);
-        let flags = |(axis, value): &(Axis, f64)| {
-            AlarmCount::sum(self.at(*axis, *value, Way::Auto).map(|row| &row.outcome.flags))
+        let energy = |axis, value| self.mean(axis, value, FramesMethod::Auto, |o| o.energy_error);
+        let flags = |(axis, value): &(FramesAxis, f64)| {
+            AlarmCount::sum(self.at(*axis, *value, FramesMethod::Auto).map(|row| &row.outcome.flags))
         };
         table
             .detail("energy error, auto", |(axis, value)| energy(*axis, *value), optional(share(3)))
@@ -381,7 +389,7 @@ impl FramesChart {
     /// Every method on every kind of device.
     fn by_device(&self) -> Sheet {
         let below = |of: &HeldOutSummary| format!("{} of {}", of.below_simple, of.devices);
-        Table::of(held_out::summaries(&self.held_out))
+        TableBuilder::of(held_out::summaries(&self.held_out))
             .detail("device", |of| of.device, plain)
             .detail("method", |of| of.method, plain)
             .detail("F1, first mark", |of| of.first, fixed(3))
@@ -396,7 +404,7 @@ impl FramesChart {
     }
 
     /// F1 with the number of scenes that fail; marked where the mean does.
-    fn cell(&self, axis: Axis, value: f64, way: Way) -> String {
+    fn cell(&self, axis: FramesAxis, value: f64, way: FramesMethod) -> String {
         let f1 = self.mean(axis, value, way, |o| Some(o.f1)).unwrap_or(0.0);
         let failed = self.at(axis, value, way).filter(|row| row.fails).count();
         let mark = if f1 < FAILS_BELOW { "*" } else { "" };
@@ -406,12 +414,16 @@ impl FramesChart {
 
     /// F1 of every scene at the usual rate; a star where a method fails.
     fn by_scene(&self) -> Sheet {
-        let usual = self.values(Axis::Rate).into_iter().rfind(|&rate_hz| rate_hz <= 50e3).unwrap_or(0.0);
-        let at = |way: Way| self.at(Axis::Rate, usual, way).collect::<Vec<_>>();
+        let usual =
+            self.values(FramesAxis::Rate).into_iter().rfind(|&rate_hz| rate_hz <= 50e3).unwrap_or(0.0);
+        let at = |way: FramesMethod| self.at(FramesAxis::Rate, usual, way).collect::<Vec<_>>();
         let f1 = |row: &FramesRow| format!("{:.3}{}", row.outcome.f1, if row.fails { "*" } else { "" });
-        let mut table =
-            Table::of(at(Way::Auto).into_iter().enumerate()).detail("scene", |(_, row)| row.scene, plain);
-        for way in Way::ALL {
+        let mut table = TableBuilder::of(at(FramesMethod::Auto).into_iter().enumerate()).detail(
+            "scene",
+            |(_, row)| row.scene,
+            plain,
+        );
+        for way in FramesMethod::ALL {
             let rows = at(way);
             table = table.detail(way.name(), |(place, _)| f1(rows[*place]), plain);
         }
@@ -442,7 +454,7 @@ pub struct FinderScore {
 /// A scenario with every seed.
 struct Subject {
     pub name: &'static str,
-    scenes: Vec<(u64, Scene)>,
+    scenes: Vec<(u64, SynthScene)>,
 }
 
 impl Subject {
@@ -453,8 +465,11 @@ impl Subject {
     }
 
     /// By each method, the outcome with each seed.
-    pub fn analyse(&self, recording: &RecorderSpec) -> Result<Vec<(Way, Vec<FinderScore>)>, StudyError> {
-        let mut of = Way::ALL.map(|way| (way, Vec::new()));
+    pub fn analyse(
+        &self,
+        recording: &RecorderSpec,
+    ) -> Result<Vec<(FramesMethod, Vec<FinderScore>)>, StudyError> {
+        let mut of = FramesMethod::ALL.map(|way| (way, Vec::new()));
         for (seed, scene) in &self.scenes {
             let trace = scene.record(&RecorderSpec { seed: *seed, ..*recording })?;
             for (way, outcomes) in &mut of {
@@ -466,13 +481,13 @@ impl Subject {
 }
 
 /// Marks some frames, finds the others and holds them against the truth.
-fn analyse(trace: &Trace, scene: &Scene, way: Way) -> Result<FinderScore, StudyError> {
+fn analyse(trace: &Trace, scene: &SynthScene, way: FramesMethod) -> Result<FinderScore, StudyError> {
     let (count, method) = match way {
-        Way::Squares => (1, FinderMethod::SumOfSquares),
-        Way::Normalized => (1, FinderMethod::Normalized),
-        Way::Templates => (MARKED.len(), FinderMethod::SumOfSquares),
-        Way::Tracking => (1, FinderMethod::Tracking),
-        Way::Auto => (1, FinderMethod::Auto),
+        FramesMethod::Squares => (1, FinderMethod::SumOfSquares),
+        FramesMethod::Normalized => (1, FinderMethod::Normalized),
+        FramesMethod::Templates => (MARKED.len(), FinderMethod::SumOfSquares),
+        FramesMethod::Tracking => (1, FinderMethod::Tracking),
+        FramesMethod::Auto => (1, FinderMethod::Auto),
     };
     let frame = |share: f64| &scene.truth[(share * scene.truth.len() as f64) as usize];
     let marks_s = MARKED.iter().zip(HAND_S).map(|(&share, hand_s)| frame(share).start_s + hand_s);
@@ -482,7 +497,7 @@ fn analyse(trace: &Trace, scene: &Scene, way: Way) -> Result<FinderScore, StudyE
         end_s: trace.end_s(),
     };
     let clock = Instant::now();
-    let found = find_with(trace, &marks, &Options { method, ..Options::default() })?;
+    let found = find_with(trace, &marks, &FinderOptions { method, ..FinderOptions::default() })?;
     let host_s = clock.elapsed().as_secs_f64();
     let frames = PowerIntegral::new(trace).frames(&found);
     let score = score(&frames, &scene.truth, TOLERANCE_S);
@@ -496,7 +511,7 @@ fn analyse(trace: &Trace, scene: &Scene, way: Way) -> Result<FinderScore, StudyE
 
 /// How many frames are wrong and right, and how many of each carry a flag. The last one ends at the end mark
 /// and is left out.
-fn flags(frames: &[FrameEnergy], scene: &Scene) -> AlarmCount {
+fn flags(frames: &[FrameEnergy], scene: &SynthScene) -> AlarmCount {
     let found_s: Vec<f64> = frames.iter().map(|frame| frame.start_s).collect();
     let truth_s: Vec<f64> = scene.truth.iter().map(|frame| frame.start_s).collect();
     let mut flags = AlarmCount::default();
@@ -541,8 +556,9 @@ mod tests {
     #[test]
     fn tracking_finds_the_frames_of_every_scene_and_few_samples_leave_hardly_any() {
         let (dir, chart) = small();
-        assert_eq!(chart.rows.len(), 3 * SCENARIOS.len() * Way::ALL.len());
-        let f1 = |rate_hz| chart.mean(Axis::Rate, rate_hz, Way::Tracking, |o| Some(o.f1)).unwrap();
+        assert_eq!(chart.rows.len(), 3 * SCENARIOS.len() * FramesMethod::ALL.len());
+        let f1 =
+            |rate_hz| chart.mean(FramesAxis::Rate, rate_hz, FramesMethod::Tracking, |o| Some(o.f1)).unwrap();
         assert!(f1(20e3) > 0.95 && f1(1e3) < f1(20e3), "{} {}", f1(1e3), f1(20e3));
         for row in &chart.rows {
             assert_eq!(row.fails, row.outcome.f1 < FAILS_BELOW);

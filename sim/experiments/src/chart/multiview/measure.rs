@@ -9,7 +9,7 @@ use pipeline::{
 };
 use run::GpuSpec;
 use serde::Serialize;
-use workloads::multiview::{Layout, Rig, Target, Views};
+use workloads::multiview::{Layout, MultiviewRig, ViewTarget, Views};
 use workloads::{Frame, Overrides, Scene};
 
 use super::{SAMPLES, line, stereo};
@@ -18,7 +18,7 @@ use crate::study::{Ran, StudyError};
 
 /// Cost of one way to render all views.
 #[derive(Clone, Copy, Debug, Serialize)]
-pub struct Run {
+pub struct ViewsRun {
     /// Passes over the geometry.
     pub passes: u32,
     /// Pixel shader lanes run, helpers included.
@@ -41,11 +41,11 @@ pub struct ViewsRow {
     /// Samples for each view of a pixel; fewer where all of them do not fit in a pixel.
     pub samples_per_view: u32,
     /// All in one pass.
-    pub one_pass: Run,
+    pub one_pass: ViewsRun,
     /// A pass each.
-    pub view_by_view: Run,
+    pub view_by_view: ViewsRun,
     /// A pass for each sample.
-    pub accumulation: Run,
+    pub accumulation: ViewsRun,
 }
 
 /// One shading cache.
@@ -59,7 +59,7 @@ pub struct Cached {
     pub entries: u32,
     /// Pixel shader lanes run for all views, for each pixel of one.
     pub invocations_per_pixel: f64,
-    /// Those of one view alone.
+    /// Invocations a pixel of one view alone.
     pub one_view_per_pixel: f64,
     /// The first over the second, less one.
     pub increase: f64,
@@ -67,7 +67,7 @@ pub struct Cached {
 
 /// Pixel shader lanes of views.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Lanes {
+pub struct ViewLanes {
     /// Of all views in one pass.
     pub all: u64,
     /// Of one view alone.
@@ -79,7 +79,7 @@ pub struct Lanes {
 /// One length of the camera line.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct Angle {
-    /// Its length over the distance of what is in focus.
+    /// Length of the camera line over the distance of what is in focus.
     pub baseline: f64,
     /// The angle under which a point in focus sees it, in degrees.
     pub degrees: f64,
@@ -91,7 +91,7 @@ pub struct Angle {
 
 /// Tile tests of all views in one pass.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-pub struct TileTests {
+pub struct TileTestCosts {
     /// Tiles culled by the tests of the sides and of the lens, coarse and fine ones.
     pub tiles_culled: u64,
     /// Multiply-adds of tile tests.
@@ -110,9 +110,9 @@ pub struct RegionTests {
     /// Length of the camera line over the distance of what is in focus.
     pub baseline: f64,
     /// One test over the whole lens.
-    pub whole: TileTests,
+    pub whole: TileTestCosts,
     /// A test of `u` over each region.
-    pub each: TileTests,
+    pub each: TileTestCosts,
     /// Whether the images are equal to the bit.
     pub equal: bool,
 }
@@ -121,7 +121,7 @@ pub struct RegionTests {
 const EXPONENT: i32 = 64;
 
 /// A scene and hardware to draw it with.
-pub struct Bench {
+pub struct MultiviewBench {
     scene: Scene,
     frame: Frame,
     gpu: GpuSpec,
@@ -129,7 +129,7 @@ pub struct Bench {
     focus: f32,
 }
 
-impl Bench {
+impl MultiviewBench {
     /// Frame of a built-in scene, for views of a size.
     ///
     /// # Errors
@@ -162,14 +162,14 @@ impl Bench {
         f64::from(self.focus)
     }
 
-    fn rig(&self, layout: &Layout, samples: u32) -> Result<Rig, StudyError> {
+    fn rig(&self, layout: &Layout, samples: u32) -> Result<MultiviewRig, StudyError> {
         let strips = layout.overlap.max(1);
         let per_strip = (samples / strips).min(256 / layout.strips());
-        Ok(Rig::new(&self.frame.camera, self.focus, layout, per_strip * strips, 1)?)
+        Ok(MultiviewRig::new(&self.frame.camera, self.focus, layout, per_strip * strips, 1)?)
     }
 
-    fn target<'a>(&self, spec: &'a PipelineSpec) -> Target<'a> {
-        Target { viewport: self.viewport, spec, background: self.scene.background(), places: &[] }
+    fn target<'a>(&self, spec: &'a PipelineSpec) -> ViewTarget<'a> {
+        ViewTarget { viewport: self.viewport, spec, background: self.scene.background(), places: &[] }
     }
 
     /// All ways of rendering so many views: two are apart as eyes are, others overlap.
@@ -184,7 +184,7 @@ impl Bench {
             let host_s = started.elapsed().as_secs_f64();
             let counts = &views.counts;
             let invocations = counts[Event::PixelInvocations];
-            Ok::<_, StudyError>(Run {
+            Ok::<_, StudyError>(ViewsRun {
                 passes: views.passes,
                 invocations,
                 over_one_view: invocations as f64 / one as f64,
@@ -205,10 +205,10 @@ impl Bench {
     /// Lanes that the view nearest to the middle takes alone, and its work.
     fn one_view(
         &self,
-        rig: &Rig,
+        rig: &MultiviewRig,
         layout: &Layout,
         draws: &[Draw<'_>],
-        to: &Target<'_>,
+        to: &ViewTarget<'_>,
     ) -> Result<(u64, Ran), StudyError> {
         let middle = (layout.views as usize - 1) / 2;
         let mut gpu = Gpu::without_packets(to.spec)?;
@@ -244,7 +244,12 @@ impl Bench {
     ///
     /// # Errors
     /// When the cache cannot be built.
-    pub fn lanes(&self, layout: Layout, shading_cache: CacheSpec, samples: u32) -> Result<Lanes, StudyError> {
+    pub fn lanes(
+        &self,
+        layout: Layout,
+        shading_cache: CacheSpec,
+        samples: u32,
+    ) -> Result<ViewLanes, StudyError> {
         let spec = PipelineSpec { shading_cache, ..self.gpu.pipeline };
         let (rig, to) = (self.rig(&layout, samples)?, self.target(&spec));
         let draws = self.frame.draws(&self.scene)?;
@@ -253,7 +258,7 @@ impl Bench {
         let mut ran = Ran::of(&gpu.finish());
         let (one, of_one) = self.one_view(&rig, &layout, &draws, &to)?;
         ran += of_one;
-        Ok(Lanes { all: counts[Event::PixelInvocations], one, ran })
+        Ok(ViewLanes { all: counts[Event::PixelInvocations], one, ran })
     }
 
     /// Views of a kind on a camera line of a length, with and without separate tests of the regions of the lens.
@@ -301,10 +306,10 @@ impl Bench {
     }
 }
 
-fn tests(counts: &Counts) -> TileTests {
+fn tests(counts: &Counts) -> TileTestCosts {
     // With screens every sample that is left is screened.
     let samples = counts[Event::SamplesScreened].max(counts[Event::SamplesTested]);
-    TileTests {
+    TileTestCosts {
         tiles_culled: counts[Event::TilesCulledSides] + counts[Event::TilesCulledLens],
         tile_madds: counts[Event::TileMadds],
         samples,

@@ -9,14 +9,14 @@ use pipeline::Replacement;
 use serde::Serialize;
 use workloads::multiview::{Layout, MAX_RUNS_OVER_INFINITE_CACHE, MAX_VIEW_ANGLE_DEG};
 
-use crate::study::table::{Sheet, Table, count, fixed, plain};
+use crate::study::table::{Sheet, TableBuilder, count, fixed, plain};
 use crate::study::tradeoff::{Metric, TradeoffPoint};
 use crate::study::{Gallery, Study, StudyError};
 use output::OutputError;
 use output::plot::{ChartPanel, Scale, Series};
 use output::terminal::{Bar, Progress};
 
-pub use measure::{Angle, Bench, Cached, Lanes, RegionTests, Run, TileTests, ViewsRow};
+pub use measure::{Angle, Cached, MultiviewBench, RegionTests, TileTestCosts, ViewLanes, ViewsRow, ViewsRun};
 
 /// Effort of the measurement.
 #[derive(Clone, Copy, Debug, Serialize)]
@@ -67,7 +67,7 @@ pub struct MultiviewChart {
     /// By number of views.
     pub rows: Vec<ViewsRow>,
     /// Views near to each other and far apart, by policy and entries of the cache.
-    pub caches: Vec<Case>,
+    pub caches: Vec<CacheCase>,
     /// Error of shading for the middle of the line, by its length.
     pub angles: Vec<Angle>,
     /// Separate tests of the regions of the lens, by views and length of the camera line.
@@ -80,8 +80,8 @@ const KINDS: [&str; 3] = ["two eyes", "seven lenses", "seven overlapping views"]
 
 /// Views for which caches are tried.
 #[derive(Clone, Debug, Serialize)]
-pub struct Case {
-    /// Their name.
+pub struct CacheCase {
+    /// Name of the views.
     pub name: &'static str,
     /// By policy and entries of the cache.
     pub rows: Vec<Cached>,
@@ -126,7 +126,7 @@ impl Study for MultiviewChart {
         let steps =
             effort.views.len() + 3 * POLICIES.len() * effort.entries.len() + (1 + KINDS.len()) * lengths;
         let bar = progress.bar("multiview", steps as u64);
-        let bench = Bench::new(effort.scene, effort.size)?;
+        let bench = MultiviewBench::new(effort.scene, effort.size)?;
         let rows = effort.views.iter().map(|&views| ticked(bench.row(views), &bar));
         let rows = rows.collect::<Result<_, _>>()?;
         let mut caches = Vec::new();
@@ -135,7 +135,7 @@ impl Study for MultiviewChart {
                 .into_iter()
                 .flat_map(|policy| effort.entries.iter().map(move |&entries| (policy, entries)));
             let rows = each.map(|(policy, entries)| ticked(bench.cached(layout, policy, entries), &bar));
-            caches.push(Case { name, rows: rows.collect::<Result<_, _>>()? });
+            caches.push(CacheCase { name, rows: rows.collect::<Result<_, _>>()? });
         }
         let angles = effort.baselines.iter().map(|&baseline| ticked(bench.angle(baseline), &bar));
         let angles = angles.collect::<Result<_, _>>()?;
@@ -154,7 +154,7 @@ impl Study for MultiviewChart {
         let marked = format!(
             "{subject}. Marked: a cache smaller than what is in use at a time, where a run warns (shading-cache-small)"
         );
-        let caches = self.caches.iter().map(Case::panel).collect();
+        let caches = self.caches.iter().map(CacheCase::panel).collect();
         to.chart("multiview_cache", [title, &marked], caches)?;
         let title = "Where one pass fails: shading that depends on who looks";
         to.chart("multiview_failures", [title, &subject], vec![self.failures()])?;
@@ -169,7 +169,7 @@ impl Study for MultiviewChart {
 
     fn tables(&self) -> Vec<Sheet> {
         let each = self.rows.iter().flat_map(|row| runs(row).map(|(method, run)| (row, method, run)));
-        let runs = Table::of(each)
+        let runs = TableBuilder::of(each)
             .column("views", "views", |(row, ..)| row.views, plain)
             .data("samples_per_view", |(row, ..)| row.samples_per_view)
             .column("method", "method", |(_, method, _)| *method, plain)
@@ -180,7 +180,7 @@ impl Study for MultiviewChart {
             .data("dram_bytes", |(.., run)| run.dram_bytes)
             .column("host_s", "host s", |(.., run)| run.host_s, fixed(3));
         let cached = self.caches.iter().flat_map(|case| case.rows.iter().map(|row| (case.name, row)));
-        let caches = Table::of(cached)
+        let caches = TableBuilder::of(cached)
             .column("case", "views", |(case, _)| *case, plain)
             .data("views", |(_, row)| row.views)
             .column("policy", "policy", |(_, row)| row.policy, plain)
@@ -193,7 +193,7 @@ impl Study for MultiviewChart {
                 |(_, row)| row.increase,
                 |increase| format!("{:+.1} %", 100.0 * increase),
             );
-        let angles = Table::of(&self.angles)
+        let angles = TableBuilder::of(&self.angles)
             .shown("camera line over distance", |angle| angle.baseline, plain)
             .shown("RMSE matt", |angle| angle.rmse_matt, fixed(4))
             .shown("RMSE with a highlight", |angle| angle.rmse_shiny, fixed(4));
@@ -201,7 +201,7 @@ impl Study for MultiviewChart {
             .regions
             .iter()
             .flat_map(|row| [(row, "whole lens", &row.whole), (row, "each region", &row.each)]);
-        let regions = Table::of(both)
+        let regions = TableBuilder::of(both)
             .column("views", "views", |(row, ..)| row.views, plain)
             .column("baseline", "line over distance", |(row, ..)| row.baseline, plain)
             .column("test", "test", |(_, test, _)| *test, plain)
@@ -217,7 +217,7 @@ impl Study for MultiviewChart {
 
     /// No method has an error of its own besides that of shading for the middle of the line.
     fn tradeoff(&self) -> Vec<TradeoffPoint> {
-        let point = |row: &ViewsRow, method: &str, run: &Run| {
+        let point = |row: &ViewsRow, method: &str, run: &ViewsRun| {
             let cost = Metric::new("shader runs over those of one view", "", run.over_one_view);
             let metrics =
                 [Metric::new("error of many views", "", 0.0), cost.beside(row.view_by_view.over_one_view)];
@@ -233,13 +233,13 @@ fn ticked<T>(done: T, bar: &Bar) -> T {
     done
 }
 
-fn runs(row: &ViewsRow) -> [(&'static str, &Run); 3] {
+fn runs(row: &ViewsRow) -> [(&'static str, &ViewsRun); 3] {
     [("one pass", &row.one_pass), ("view by view", &row.view_by_view), ("accumulation", &row.accumulation)]
 }
 
 impl MultiviewChart {
     fn costs(&self) -> Vec<ChartPanel> {
-        let panel = |title: &str, up: &str, of: fn(&Run) -> f64| {
+        let panel = |title: &str, up: &str, of: fn(&ViewsRun) -> f64| {
             let curve = |method: usize| {
                 let points = self.rows.iter().map(|row| (f64::from(row.views), of(runs(row)[method].1)));
                 Series::curve(runs(&self.rows[0])[method].0, points)
@@ -257,7 +257,7 @@ impl MultiviewChart {
 
     /// Work of the tests of each region over that of the test of the whole lens.
     fn region_panels(&self) -> Vec<ChartPanel> {
-        let panel = |title: &str, of: fn(&TileTests) -> u64| {
+        let panel = |title: &str, of: fn(&TileTestCosts) -> u64| {
             let curve = |views: &'static str| {
                 let rows = self.regions.iter().filter(move |row| row.views == views);
                 let ratio = move |row: &RegionTests| of(&row.each) as f64 / of(&row.whole).max(1) as f64;
@@ -294,7 +294,7 @@ impl MultiviewChart {
     }
 }
 
-impl Case {
+impl CacheCase {
     /// Caches in which what is in use at a time has no room are marked.
     fn panel(&self) -> ChartPanel {
         let curve = |(policy, _): &(&'static str, _)| {

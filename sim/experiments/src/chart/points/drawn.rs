@@ -13,7 +13,7 @@ use workloads::points::job::rasterized;
 use workloads::points::poisson::{Domain, PoissonSpec, Spacing, poisson_disk};
 use workloads::points::quality::{chi_square, largest_hole};
 use workloads::points::volume::{Blurred, Torus, Volume, every_sample, standard_mode};
-use workloads::points::white::{Named, Numbers, WhiteSpec, columns_for, counts, shares, white_noise};
+use workloads::points::white::{NamedDensity, Numbers, WhiteSpec, columns_for, counts, shares, white_noise};
 use workloads::points::{DrawnNoise, NoiseSpec, draw_noise};
 use workloads::scene::Overrides;
 
@@ -127,7 +127,7 @@ fn drawn_noise<const D: usize>(count: f64) -> Result<DrawnNoise<D>, StudyError> 
     let hardware = GpuSpec::load("reference")?.pipeline;
     let mut gpu = Gpu::without_packets(&hardware).map_err(StudyError::pipeline)?;
     let spec = NoiseSpec { count, seed: 1, across: columns_for(D) };
-    draw_noise::<D>(&Named::Gauss, &spec, &mut gpu).map_err(StudyError::pipeline)
+    draw_noise::<D>(&NamedDensity::Gauss, &spec, &mut gpu).map_err(StudyError::pipeline)
 }
 
 fn noise<const D: usize>(effort: &PointsEffort, cells: u64) -> Result<DrawnRow, StudyError> {
@@ -135,9 +135,9 @@ fn noise<const D: usize>(effort: &PointsEffort, cells: u64) -> Result<DrawnRow, 
     let drawn = drawn_noise::<D>(effort.white as f64)?;
     let spec =
         WhiteSpec { count: effort.white, seed: 1, across: columns_for(D), numbers: Numbers::Independent };
-    let (cpu_s, found) = timed(|| white_noise::<D>(&Named::Gauss, &spec));
+    let (cpu_s, found) = timed(|| white_noise::<D>(&NamedDensity::Gauss, &spec));
     let found = found.map_err(StudyError::pipeline)?;
-    let expected = shares::<D>(&Named::Gauss, cells, 8);
+    let expected = shares::<D>(&NamedDensity::Gauss, cells, 8);
     let p = |points: &[[f64; D]]| chi_square(&counts(points, cells), &expected).p;
     Ok(DrawnRow { cpu_s, error: p(&drawn.points), cpu_error: p(&found.points), ..row })
 }

@@ -12,10 +12,12 @@ use workloads::points::poisson::{Domain, PoissonError, PoissonSpec, Spacing, bal
 use workloads::points::quality::{
     Spectrum, chi_square, closer_than, free_share, largest_hole, least_distance,
 };
-use workloads::points::white::{Density, Named, Numbers, WhiteError, WhiteSpec, counts, shares, white_noise};
+use workloads::points::white::{
+    Density, NamedDensity, Numbers, WhiteError, WhiteSpec, counts, shares, white_noise,
+};
 use workloads::points::{bridson, plain_darts};
 
-use crate::study::table::{Sheet, Table, count, fixed, plain};
+use crate::study::table::{Sheet, TableBuilder, count, fixed, plain};
 use crate::study::tradeoff::{Metric, TradeoffPoint};
 use crate::study::{Gallery, Study, StudyError};
 use workloads::points::job::{MAX_CANDIDATES_PER_POINT, MIN_DRAWN_SHARE};
@@ -47,7 +49,7 @@ pub struct PointsChart {
     /// Dimension by dimension, method by method.
     pub rows: Vec<PointsRow>,
     /// Uncovered regions thinner than an ulp.
-    pub coarse: Vec<Coarse>,
+    pub coarse: Vec<CoarsePoints>,
     /// Candidates for a point that follows a density.
     pub columns: Vec<Columns>,
     /// Rasterization beside the CPU sampler.
@@ -101,7 +103,7 @@ impl Study for PointsChart {
 
     fn tables(&self) -> Vec<Sheet> {
         let free = |free_share: f64| format!("{free_share:.1e}");
-        let rows = Table::of(&self.rows)
+        let rows = TableBuilder::of(&self.rows)
             .column("dimensions", "D", |row| row.dimensions, plain)
             .data("method", |row| row.method)
             .data("effort", |row| row.effort)
@@ -120,18 +122,18 @@ impl Study for PointsChart {
             .column("peak_power", "peak", |row| row.peak.1, fixed(2))
             .detail("at", |row| row.peak.0, fixed(2))
             .csv("points.csv");
-        let coarse = Table::of(&self.coarse)
+        let coarse = TableBuilder::of(&self.coarse)
             .shown("r in spacings of numbers", |c| c.radius_ulp, fixed(0))
             .shown("points", |c| c.points, count)
             .shown("thin regions", |c| c.thin_regions, count)
             .shown("hole beyond r", |c| c.beyond, |beyond| format!("{beyond:.1e} r"));
-        let columns = Table::of(&self.columns)
+        let columns = TableBuilder::of(&self.columns)
             .detail("D", |c| c.dimensions, plain)
             .detail("columns", |c| c.across, plain)
             .detail("candidates a point", |c| c.candidates_each, fixed(3))
             .detail("p", |c| c.p, fixed(3))
             .detail("p, low discrepancy", |c| c.p_low_discrepancy, fixed(4));
-        let drawn = Table::of(&self.drawn)
+        let drawn = TableBuilder::of(&self.drawn)
             .column("kind", "points", |row| row.kind, plain)
             .column("dimensions", "D", |row| row.dimensions, plain)
             .column("points", "number", |row| row.points, count)
@@ -251,10 +253,10 @@ impl PointsChart {
 
     /// Numbers too coarse for the disks, and columns too few for the density.
     fn failures(&self) -> Vec<ChartPanel> {
-        let coarse = |title: &str, up: &str, of: fn(&Coarse) -> f64| {
+        let coarse = |title: &str, up: &str, of: fn(&CoarsePoints) -> f64| {
             let curve =
                 Series::curve("uncovered regions, 2D", self.coarse.iter().map(|c| (c.radius_ulp, of(c))));
-            let warned = |c: &&Coarse| c.thin_regions as f64 > MAX_THIN_PER_POINT * c.points as f64;
+            let warned = |c: &&CoarsePoints| c.thin_regions as f64 > MAX_THIN_PER_POINT * c.points as f64;
             let last = self.coarse.iter().rfind(warned);
             ChartPanel::new(title, ["r in spacings of numbers", up], vec![curve])
                 .on(Scale::Doublings, Scale::Decades)
@@ -285,7 +287,7 @@ impl PointsChart {
 pub struct PointsRow {
     /// In how many dimensions.
     pub dimensions: usize,
-    /// Its name.
+    /// Name of the method.
     pub method: &'static str,
     /// How long it may go on: misses in a row, or candidates around a point; 0 where it ends by itself.
     pub effort: u64,
@@ -378,7 +380,7 @@ fn judged<const D: usize>(
     radius: f64,
     sets: &[Vec<[f64; D]>],
     points_per_s: f64,
-    asked: &PointsEffort,
+    amounts: &PointsEffort,
 ) -> PointsRow {
     let (set, torus) = (&sets[0], Domain::Torus);
     let rate = (set.len() as f64).powf(1.0 / D as f64);
@@ -396,7 +398,7 @@ fn judged<const D: usize>(
         closer_pairs: closer_than(set, radius, torus),
         least_over_r: least_distance(set, torus) / radius,
         hole_over_r: largest_hole(set, torus).radius / radius,
-        free_share: free_share(set, radius, torus, asked.darts),
+        free_share: free_share(set, radius, torus, amounts.darts),
         low_power: spectrum.low(),
         peak: spectrum.peak(),
         spectrum: spectrum.curve(),
@@ -405,7 +407,7 @@ fn judged<const D: usize>(
 
 /// Poisson-disk points of the plane on coarse numbers.
 #[derive(Clone, Debug, Serialize)]
-pub struct Coarse {
+pub struct CoarsePoints {
     /// Coordinates are multiples of 2 to the power of minus this.
     pub bits: u32,
     /// The least distance in spacings of numbers.
@@ -424,13 +426,13 @@ const COARSE_RADIUS: f64 = 1.0 / 64.0;
 const COARSEST_BITS: u32 = 12;
 
 /// Finer and finer numbers, from disks on that are as few numbers wide as may be.
-fn coarse(effort: &PointsEffort) -> Result<Vec<Coarse>, PoissonError> {
+fn coarse(effort: &PointsEffort) -> Result<Vec<CoarsePoints>, PoissonError> {
     let each = (COARSEST_BITS..=effort.finest_bits).step_by(2).map(|bits| {
         let spacing = Spacing::Bits(bits);
         let spec = PoissonSpec { radius: COARSE_RADIUS, domain: Domain::Torus, seed: 1, spacing };
         let found = poisson_disk::<2>(&spec)?;
         let hole = largest_hole(&found.points, Domain::Torus);
-        Ok(Coarse {
+        Ok(CoarsePoints {
             bits,
             radius_ulp: COARSE_RADIUS * spacing.per_unit(),
             points: found.points.len(),
@@ -466,7 +468,7 @@ fn columns(effort: &PointsEffort) -> Result<Vec<Columns>, WhiteError> {
 }
 
 fn of<const D: usize>(effort: &PointsEffort, across: &[u32], cells: u64) -> Result<Vec<Columns>, WhiteError> {
-    let bell: &dyn Density<D> = &Named::Gauss;
+    let bell: &dyn Density<D> = &NamedDensity::Gauss;
     let expected = shares(bell, cells, 8);
     let measure = |&across: &u32| {
         let spec = WhiteSpec { count: effort.white, seed: 1, across, numbers: Numbers::Independent };

@@ -20,7 +20,7 @@ use crate::study::StudyError;
 
 /// One measurement.
 #[derive(Clone, Copy, Debug, Serialize)]
-pub struct Point {
+pub struct SamplingPoint {
     /// Samples in a pixel.
     pub samples_per_pixel: u32,
     /// Root mean squared error, linear radiance.
@@ -78,7 +78,7 @@ pub(super) fn point(
     samples_per_pixel: u32,
     reference: &[Vec3],
     effort: &SamplingEffort,
-) -> Result<Point, StudyError> {
+) -> Result<SamplingPoint, StudyError> {
     let (mut squares, mut host_s) = (0.0, f64::INFINITY);
     for seed in 1..=u64::from(effort.seeds) {
         let table = table(name, samples_per_pixel, seed)?;
@@ -87,7 +87,7 @@ pub(super) fn point(
         host_s = host_s.min(started.elapsed().as_secs_f64());
         squares += mean_square(&errors(&image, reference));
     }
-    Ok(Point { samples_per_pixel, rmse: (squares / f64::from(effort.seeds)).sqrt(), host_s })
+    Ok(SamplingPoint { samples_per_pixel, rmse: (squares / f64::from(effort.seeds)).sqrt(), host_s })
 }
 
 /// Error and time of one table from one sample per pixel to the most, doubling.
@@ -96,7 +96,7 @@ pub(super) fn sweep(
     name: &str,
     reference: &[Vec3],
     effort: &SamplingEffort,
-) -> Result<Vec<Point>, StudyError> {
+) -> Result<Vec<SamplingPoint>, StudyError> {
     let counts = (0..=effort.most_samples.ilog2()).map(|power| 1 << power);
     counts.map(|count| point(stage, name, count, reference, effort)).collect()
 }
@@ -272,7 +272,7 @@ fn every_number(
     let row = |table| {
         let counts = (1..=effort.every_up_to).into_par_iter();
         let points = counts.map(|n| point(stage, table, n, reference, effort));
-        let points: Vec<Point> = points.collect::<Result<_, _>>()?;
+        let points: Vec<SamplingPoint> = points.collect::<Result<_, _>>()?;
         Ok(SamplingRow { scene: stage.name(), table, exponent: fitted(&points), points })
     };
     ["owen", "random", "jittered"].into_iter().map(row).collect()

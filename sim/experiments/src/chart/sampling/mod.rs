@@ -13,11 +13,11 @@ use output::terminal::Progress;
 use serde::Serialize;
 
 use super::exponent;
-use crate::study::table::{Sheet, Table, fixed, optional, plain};
+use crate::study::table::{Sheet, TableBuilder, fixed, optional, plain};
 use crate::study::tradeoff::{Metric, TradeoffPoint};
 use crate::study::{Gallery, Study, StudyError};
 
-pub use measure::{Failures, Point, Shared};
+pub use measure::{Failures, SamplingPoint, Shared};
 
 /// Effort of the measurement.
 #[derive(Clone, Copy, Debug, Serialize)]
@@ -55,7 +55,7 @@ pub struct SamplingRow {
     /// Exponent of error over samples per pixel, from `FIT_FROM` samples on.
     pub exponent: Option<f64>,
     /// From few samples to many.
-    pub points: Vec<Point>,
+    pub points: Vec<SamplingPoint>,
 }
 
 /// Exponents are fitted from this many samples per pixel on.
@@ -126,7 +126,7 @@ impl Study for SamplingChart {
             "RMSE in linear light against {} samples per pixel, {width}x{height} pixels; exponents fitted from {FIT_FROM} samples on",
             self.reference_samples_per_pixel
         );
-        let over_samples = panels(&self.rows, "samples per pixel", true, Point::samples);
+        let over_samples = panels(&self.rows, "samples per pixel", true, SamplingPoint::samples);
         to.chart("sampling_error", ["Image error over samples per pixel", &subject], over_samples)?;
         let over_time = panels(&self.rows, "host seconds a frame", false, |point| point.host_s);
         to.chart("sampling_time", ["Image error over host time", &subject], over_time)?;
@@ -136,8 +136,8 @@ impl Study for SamplingChart {
     fn tables(&self) -> Vec<Sheet> {
         let exponents = self.rows.iter().chain(&self.failures.many_edges);
         let most = format!("RMSE at {} samples", self.effort.most_samples);
-        let rmse = |point: Option<&Point>| point.map(|point| point.rmse);
-        let mut exponents = Table::of(exponents)
+        let rmse = |point: Option<&SamplingPoint>| point.map(|point| point.rmse);
+        let mut exponents = TableBuilder::of(exponents)
             .shown("scene", |row| row.scene, plain)
             .shown("table", |row| row.table, plain)
             .shown("exponent", |row| row.exponent, optional(fixed(2)))
@@ -148,12 +148,12 @@ impl Study for SamplingChart {
             let heading = format!("n = {}", point.samples_per_pixel);
             exponents = exponents.detail(&heading, |row| rmse(row.points.get(place)), optional(fixed(4)));
         }
-        let shared = Table::of(&self.failures.shared)
+        let shared = TableBuilder::of(&self.failures.shared)
             .detail("table", |row| row.table, plain)
             .detail("samples", |row| row.samples_per_pixel, plain)
             .detail("RMSE", |row| row.rmse, fixed(4))
             .detail("correlation of neighbours' errors", |row| row.neighbour_correlation, fixed(2));
-        let points = Table::of(self.points())
+        let points = TableBuilder::of(self.points())
             .data("chart", |(chart, ..)| *chart)
             .data("scene", |(_, row, _)| row.scene)
             .data("table", |(_, row, _)| row.table)
@@ -165,7 +165,7 @@ impl Study for SamplingChart {
     }
 
     fn tradeoff(&self) -> Vec<TradeoffPoint> {
-        let point = |(row, point): (&SamplingRow, &Point)| {
+        let point = |(row, point): (&SamplingRow, &SamplingPoint)| {
             let level = format!("{} samples a pixel", point.samples_per_pixel);
             let metrics = [Metric::rmse(point.rmse), Metric::host_s(point.host_s)];
             TradeoffPoint::new(format!("an image ({})", row.scene), [row.table, &level], metrics)
@@ -177,7 +177,7 @@ impl Study for SamplingChart {
 
 impl SamplingChart {
     /// Every measurement with the part of the chart that it is for.
-    fn points(&self) -> impl Iterator<Item = (&'static str, &SamplingRow, &Point)> {
+    fn points(&self) -> impl Iterator<Item = (&'static str, &SamplingRow, &SamplingPoint)> {
         let groups = [
             ("error", &self.rows),
             ("every_number", &self.failures.every_number),
@@ -188,7 +188,7 @@ impl SamplingChart {
     }
 
     fn failures(&self) -> Vec<ChartPanel> {
-        let scaled = |p: &Point| {
+        let scaled = |p: &SamplingPoint| {
             let n = p.samples();
             (n, p.rmse * n.sqrt())
         };
@@ -200,7 +200,7 @@ impl SamplingChart {
         let axes = ["samples per pixel", "RMSE x root of samples"];
         let numbers = ChartPanel::new("motion, every number of samples", axes, curves.collect())
             .on(Scale::Doublings, Scale::Decades);
-        let fence = panels(&self.failures.many_edges, "samples per pixel", true, Point::samples);
+        let fence = panels(&self.failures.many_edges, "samples per pixel", true, SamplingPoint::samples);
         let fence = fence
             .into_iter()
             .map(|panel| ChartPanel { title: "16 edges in a pixel (fence)".to_owned(), ..panel });
@@ -208,14 +208,19 @@ impl SamplingChart {
     }
 }
 
-impl Point {
+impl SamplingPoint {
     fn samples(&self) -> f64 {
         f64::from(self.samples_per_pixel)
     }
 }
 
 /// A panel for each scene.
-fn panels(rows: &[SamplingRow], across: &str, doubling: bool, x: fn(&Point) -> f64) -> Vec<ChartPanel> {
+fn panels(
+    rows: &[SamplingRow],
+    across: &str,
+    doubling: bool,
+    x: fn(&SamplingPoint) -> f64,
+) -> Vec<ChartPanel> {
     let scenes = rows.chunk_by(|a, b| a.scene == b.scene);
     let scale = if doubling { Scale::Doublings } else { Scale::Decades };
     let panel = |rows: &[SamplingRow]| {
@@ -225,13 +230,13 @@ fn panels(rows: &[SamplingRow], across: &str, doubling: bool, x: fn(&Point) -> f
     scenes.map(panel).collect()
 }
 
-fn curve(row: &SamplingRow, noted: bool, place: impl Fn(&Point) -> (f64, f64)) -> Series {
+fn curve(row: &SamplingRow, noted: bool, place: impl Fn(&SamplingPoint) -> (f64, f64)) -> Series {
     let note = row.exponent.filter(|_| noted).map_or(String::new(), |p| format!("{p:.2}"));
     Series { note, ..Series::curve(row.table, row.points.iter().map(place)) }
 }
 
 /// The exponent of error over samples per pixel.
-fn fitted(points: &[Point]) -> Option<f64> {
+fn fitted(points: &[SamplingPoint]) -> Option<f64> {
     let late = points.iter().filter(|point| point.samples_per_pixel >= FIT_FROM);
     exponent(late.map(|point| (f64::from(point.samples_per_pixel), point.rmse)))
 }

@@ -6,7 +6,7 @@ use timing::Level;
 
 use super::{ErrorRow, LEVELS, StatedErrorsChart};
 use crate::chart::quantiles;
-use crate::study::table::{Sheet, Table, optional, percent, plain, share};
+use crate::study::table::{Sheet, TableBuilder, optional, percent, plain, share};
 
 /// Error of cycles that `packet` promises to warn of, as a share.
 const FAR: f64 = 0.08;
@@ -30,11 +30,11 @@ pub struct Accuracy {
     pub energy_p95_percent: f64,
     /// Runs more than 8 % off in cycles, with a warning.
     pub far_warned: usize,
-    /// Those without.
+    /// Runs more than 8 % off in cycles, without a warning.
     pub far_silent: usize,
     /// Runs within 8 %, with a warning.
     pub near_warned: usize,
-    /// Those without.
+    /// Runs within 8 %, without a warning.
     pub near_silent: usize,
 }
 
@@ -74,7 +74,7 @@ impl Accuracy {
 
 /// Runs at a level, with or without a warning. Errors are factors less one.
 #[derive(Clone, Debug, Serialize)]
-pub struct Group {
+pub struct ErrorGroup {
     /// The level.
     pub level: Level,
     /// Whether it warns.
@@ -83,7 +83,7 @@ pub struct Group {
     pub runs: usize,
     /// The error of cycles to state from these runs; infinite with too few of them.
     pub cycles: f64,
-    /// That of energy.
+    /// Error of energy.
     pub energy: f64,
     /// Share of runs whose cycles are within the error that the program states; `None` without runs.
     pub held_cycles: Option<f64>,
@@ -129,14 +129,14 @@ fn held_out(rows: &[&ErrorRow], log: Log) -> Option<f64> {
 }
 
 /// All groups.
-pub(super) fn groups(rows: &[ErrorRow]) -> Vec<Group> {
+pub(super) fn groups(rows: &[ErrorRow]) -> Vec<ErrorGroup> {
     let of = |(level, warns): (Level, bool)| {
         let rows: Vec<&ErrorRow> =
             rows.iter().filter(|row| (row.level, row.is_warned()) == (level, warns)).collect();
         let sizes = |log: Log| rows.iter().map(move |row| size(log(row)));
         let (cycles, energy): (Log, Log) = (|row| row.cycles_log, |row| row.energy_log);
         let stated = StatedError::at(level, warns);
-        Group {
+        ErrorGroup {
             level,
             warns,
             runs: rows.len(),
@@ -203,7 +203,7 @@ fn flips_by(rows: &[ErrorRow], level: Level, by: &'static str) -> Flips {
 impl StatedErrorsChart {
     /// Errors and warnings of the levels.
     pub(super) fn level_sheet(&self) -> Sheet {
-        Table::of(&self.levels)
+        TableBuilder::of(&self.levels)
             .shown("level", |row| row.level.name(), plain)
             .shown("runs", |row| row.runs, plain)
             .shown("cycles: median", |row| row.cycles_median_percent, percent(2))
@@ -220,7 +220,7 @@ impl StatedErrorsChart {
 
     /// Stated errors. The file is the one that the program reads.
     pub(super) fn group_sheet(&self) -> Sheet {
-        Table::of(&self.groups)
+        TableBuilder::of(&self.groups)
             .column("level", "level", |row| row.level.name(), plain)
             .column("warns", "warns", |row| row.warns.to_string(), plain)
             .column("runs", "runs", |row| row.runs, plain)
@@ -236,7 +236,7 @@ impl StatedErrorsChart {
 
     /// Pairs of GPUs.
     pub(super) fn flip_sheet(&self) -> Sheet {
-        Table::of(&self.flips)
+        TableBuilder::of(&self.flips)
             .shown("level", |row| row.level.name(), plain)
             .shown("order by", |row| row.by, plain)
             .shown("pairs of GPUs", |row| row.pairs, plain)
@@ -247,7 +247,7 @@ impl StatedErrorsChart {
 
     /// Every run.
     pub(super) fn row_sheet(&self) -> Sheet {
-        Table::of(&self.rows)
+        TableBuilder::of(&self.rows)
             .data("subject", |row| row.subject.as_str())
             .data("gpu", |row| row.gpu)
             .data("level", |row| row.level.name())

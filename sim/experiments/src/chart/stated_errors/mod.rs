@@ -11,7 +11,7 @@ mod figures;
 
 use activity::Bounded;
 use output::OutputError;
-use output::plot::{AxisSpec, ChartPanel, Mark, Paint, Scale, Series};
+use output::plot::{AxisSpec, ChartPanel, Paint, PlotMark, Scale, Series};
 use output::terminal::Progress;
 use rayon::prelude::*;
 use run::{GpuSpec, RunError, StatedError};
@@ -25,7 +25,7 @@ use super::timing::measure::{Written, power_model, timed};
 use crate::study::table::Sheet;
 use crate::study::{Gallery, Study, StudyError};
 
-pub use figures::{Accuracy, Flips, Group};
+pub use figures::{Accuracy, ErrorGroup, Flips};
 
 /// Levels that have errors.
 const LEVELS: [Level; 2] = [Level::Packet, Level::Bound];
@@ -52,7 +52,7 @@ pub struct StatedErrorsEffort {
 pub struct ErrorRow {
     /// The scene, family or workload.
     pub subject: String,
-    /// Its place in the list of subjects.
+    /// Place of the subject in the list of subjects.
     pub subject_number: usize,
     /// Number of the GPU.
     pub gpu: u64,
@@ -92,7 +92,7 @@ pub struct StatedErrorsChart {
     /// Errors of levels, and what their warnings say.
     pub levels: Vec<Accuracy>,
     /// Stated errors, and how often they hold.
-    pub groups: Vec<Group>,
+    pub groups: Vec<ErrorGroup>,
     /// Pairs of GPUs whose order a level turns round.
     pub flips: Vec<Flips>,
     /// A row for each frame, GPU and level.
@@ -156,7 +156,7 @@ impl Study for StatedErrorsChart {
 
     /// Stated errors hold as often as they say, on frames and GPUs that they were not made from.
     fn fault(&self) -> Option<String> {
-        let broken = |group: &&Group| group.held_out_cycles.is_some_and(|share| share < MIN_HELD);
+        let broken = |group: &&ErrorGroup| group.held_out_cycles.is_some_and(|share| share < MIN_HELD);
         let group = self.groups.iter().filter(|_| self.effort.gpus >= MIN_GPUS).find(broken)?;
         let held = 100.0 * group.held_out_cycles?;
         let warned = if group.warns { "with" } else { "without" };
@@ -231,9 +231,9 @@ impl StatedErrorsChart {
         let stated = 100.0 * libm::log1p(StatedError::at(level, false).cycles);
         let line = ends.map(|x| (x, stated)).to_vec();
         let series = vec![
-            Series::new("without a warning", Mark::Dots(points(false))).painted(Paint::Like(0)),
-            Series::new("with a warning", Mark::Rings(points(true))).painted(Paint::Like(1)),
-            Series::new("stated", Mark::Curve(line)).painted(Paint::Ink),
+            Series::new("without a warning", PlotMark::Dots(points(false))).painted(Paint::Like(0)),
+            Series::new("with a warning", PlotMark::Rings(points(true))).painted(Paint::Like(1)),
+            Series::new("stated", PlotMark::Curve(line)).painted(Paint::Ink),
         ];
         let across = AxisSpec { name: name.to_owned(), scale, ..AxisSpec::default() };
         let up = AxisSpec {

@@ -14,7 +14,7 @@ use run::{
 };
 use serde::Serialize;
 use timing::Level;
-use workloads::job::{OptionSource, Reduction, Request};
+use workloads::job::{JobRequest, OptionSource, Reduction};
 use workloads::stress::{Size, StressScene};
 use workloads::visibility::Unshaded;
 use workloads::{Job, Overrides, catalog};
@@ -295,8 +295,8 @@ fn of_workload(variant: &Variant, quick: bool) -> Result<Subject, RunError> {
     Ok(Subject { name, kind: SubjectKind::Workload, what: middle_frame(job) })
 }
 
-fn request(overrides: &Overrides) -> Request<'_> {
-    Request { overrides, seed: 1 }
+fn request(overrides: &Overrides) -> JobRequest<'_> {
+    JobRequest { overrides, seed: 1 }
 }
 
 fn middle_frame(job: Box<dyn Job>) -> What {
@@ -317,7 +317,7 @@ impl Subject {
         &self.name
     }
 
-    /// Its packets as the pipeline of `gpu` emits them.
+    /// Packets of the subject as the pipeline of `gpu` emits them.
     pub fn stream(&self, gpu: &GpuSpec) -> Result<Packets, RunError> {
         let mut stream = Packets::default();
         self.render(gpu, |packet, lines| {

@@ -28,7 +28,7 @@ const TIMES: usize = 5;
 pub struct TimingRow {
     /// The scene, family or workload.
     pub scene: String,
-    /// Its kind; `None` for a stream that no pipeline emitted.
+    /// Kind of the scene; `None` for a stream that no pipeline emitted.
     pub kind: Option<SubjectKind>,
     /// The GPU.
     pub gpu: String,
@@ -319,7 +319,7 @@ pub struct FailedLevel {
     pub warns: Vec<&'static str>,
 }
 
-/// A rate by a microbenchmark that asks for nothing else, in units of 1e9 a second.
+/// A rate by a microbenchmark that requests nothing else, in units of 1e9 a second.
 #[derive(Clone, Debug, Serialize)]
 pub struct RateRow {
     /// The work that the rate counts.
@@ -354,7 +354,7 @@ fn failure(stream: &'static str, found: Vec<TimingRow>) -> FailureRow {
         let row = found.iter().find(|row| row.level == level);
         row.map_or(0.0, |row| row.cycle_error_percent.abs().max(row.energy_error_percent.abs()))
     };
-    let chosen = |asked| Chosen { asked_percent: asked, level: cheapest_level(error, asked) };
+    let chosen = |percent| Chosen { asked_percent: percent, level: cheapest_level(error, percent) };
     let level = |row: &TimingRow| FailedLevel {
         cycle_error_percent: row.cycle_error_percent,
         energy_error_percent: row.energy_error_percent,

@@ -14,7 +14,7 @@ use serde::Serialize;
 use timing::Level;
 
 use super::quantiles;
-use crate::study::table::{Sheet, Table, fixed, percent, plain};
+use crate::study::table::{Sheet, TableBuilder, fixed, percent, plain};
 use crate::study::tradeoff::{Metric, TradeoffPoint};
 use crate::study::{Gallery, Study, StudyError};
 
@@ -29,7 +29,7 @@ const GPUS: [&str; 5] = ["mobile", "reference", "hd_4000", "iris_pro", "discrete
 
 /// A level in a few numbers. Errors are against `stepped`, in percent, over all rows.
 #[derive(Clone, Debug, Default, Serialize)]
-pub struct Figures {
+pub struct LevelFigures {
     /// Of the cycles of a frame: median, 95th percentile and worst.
     pub cycle_error_median_percent: f64,
     /// See above.
@@ -77,7 +77,7 @@ pub struct TimingChart {
     /// Whether it is the short one.
     pub quick: bool,
     /// The levels by name.
-    pub levels: BTreeMap<&'static str, Figures>,
+    pub levels: BTreeMap<&'static str, LevelFigures>,
     /// Speed of the reference.
     pub reference: Reference,
     /// Animations at every level, drawn and timed, on every GPU.
@@ -159,7 +159,7 @@ impl Study for TimingChart {
     }
 
     fn tradeoff(&self) -> Vec<TradeoffPoint> {
-        let both = |(level, f): (&&'static str, &Figures)| {
+        let both = |(level, f): (&&'static str, &LevelFigures)| {
             let cost = Metric::new(HOST_TIME, "", 1.0 / f.speedup_over_stepped);
             let errors = [
                 Metric::new("median error of cycles", "%", f.cycle_error_median_percent),
@@ -216,16 +216,20 @@ fn animated(
     Ok(rows)
 }
 
-fn figures(level: Level, rows: &[TimingRow], added: &[AddedRow]) -> Figures {
+fn figures(level: Level, rows: &[TimingRow], added: &[AddedRow]) -> LevelFigures {
     if level == Level::Stepped {
-        return Figures { speedup_over_stepped: 1.0, speedup_over_stepped_least: 1.0, ..Figures::default() };
+        return LevelFigures {
+            speedup_over_stepped: 1.0,
+            speedup_over_stepped_least: 1.0,
+            ..LevelFigures::default()
+        };
     }
     let of = |pick: fn(&TimingRow) -> f64| quantiles(rows.iter().filter(|row| row.level == level).map(pick));
     let added = quantiles(added.iter().filter(|row| row.level == level).map(|row| row.added_percent));
     let (cycles, energy) =
         (of(|row| row.cycle_error_percent.abs()), of(|row| row.energy_error_percent.abs()));
     let (busy, speedup) = (of(|row| row.busy_error_percent), of(|row| row.speedup_over_stepped));
-    Figures {
+    LevelFigures {
         cycle_error_median_percent: cycles(0.5),
         cycle_error_p95_percent: cycles(0.95),
         cycle_error_worst_percent: cycles(1.0),
@@ -259,11 +263,11 @@ impl TimingChart {
             self.reference.unit_cycles_per_s / 1e6,
             self.reference.cycles_per_s / 1e6
         );
-        let added = |(name, f): &(&&'static str, &Figures)| match **name == Level::Stepped.name() {
+        let added = |(name, f): &(&&'static str, &LevelFigures)| match **name == Level::Stepped.name() {
             true => "-".to_owned(),
             false => format!("{:.0} %", f.added_percent),
         };
-        Table::of(&self.levels)
+        TableBuilder::of(&self.levels)
             .shown("level", |(name, _)| **name, plain)
             .shown("cycles: median", |(_, f)| f.cycle_error_median_percent, percent(2))
             .shown("95 %", |(_, f)| f.cycle_error_p95_percent, percent(2))
@@ -289,7 +293,7 @@ impl TimingChart {
             });
             each.collect::<Vec<_>>().join(", ")
         };
-        Table::of(self.subjects())
+        TableBuilder::of(self.subjects())
             .detail("frame", |row| row.scene.as_str(), plain)
             .detail("cycles", |row| row.stepped_cycles, plain)
             .detail(&format!("packet, % on {}", GPUS.join(", ")), |row| of(&row.scene, LEVELS[0]), plain)
@@ -310,7 +314,7 @@ impl TimingChart {
 
     /// Every scene on every GPU at every level but the reference.
     fn row_sheet(&self) -> Sheet {
-        Table::of(&self.rows)
+        TableBuilder::of(&self.rows)
             .data("scene", |row| row.scene.as_str())
             .data("gpu", |row| row.gpu.as_str())
             .data("level", |row| row.level.name())
@@ -349,7 +353,7 @@ impl TimingChart {
             let of = ["frame, timing alone", &row.scene, &row.gpu, row.level.name()];
             (of, None, 1.0 / row.speedup_over_stepped, row.cycle_error_percent)
         });
-        Table::of(animations.chain(frames))
+        TableBuilder::of(animations.chain(frames))
             .data("kind", |(of, ..)| of[0])
             .data("scene", |(of, ..)| of[1])
             .data("gpu", |(of, ..)| of[2])
@@ -364,7 +368,7 @@ impl TimingChart {
     /// Streams that break levels, a row for each level.
     fn failure_sheet(&self) -> Sheet {
         let each = self.failures.iter().flat_map(|row| row.levels.iter().map(move |found| (row, found)));
-        Table::of(each)
+        TableBuilder::of(each)
             .data("stream", |(row, _)| row.stream)
             .data("gpu", |(row, _)| row.gpu.as_str())
             .data("stepped_cycles", |(row, _)| row.stepped_cycles)
@@ -389,19 +393,19 @@ impl TimingChart {
                 .flat_map(|(level, found)| found.warns.iter().map(move |code| format!("{code} at {level}")));
             each.collect::<Vec<_>>().join(", ")
         };
-        let mut table = Table::of(&self.failures)
+        let mut table = TableBuilder::of(&self.failures)
             .detail("stream", |row| row.stream, plain)
             .detail("GPU", |row| row.gpu.as_str(), plain)
             .detail("cycles", |row| row.stepped_cycles, plain)
             .detail("packet", error(LEVELS[0]), signed(1))
             .detail("bound", error(LEVELS[1]), signed(1))
             .detail("warns", warns, plain);
-        let asked: Vec<f64> = self
+        let requested: Vec<f64> = self
             .failures
             .first()
             .map_or(Vec::new(), |row| row.chosen.iter().map(|chosen| chosen.asked_percent).collect());
-        for (place, asked) in asked.into_iter().enumerate() {
-            table = table.detail(&format!("{asked} %"), |row| row.chosen[place].level.name(), plain);
+        for (place, percent) in requested.into_iter().enumerate() {
+            table = table.detail(&format!("{percent} %"), |row| row.chosen[place].level.name(), plain);
         }
         table.sheet()
     }
@@ -411,7 +415,7 @@ impl TimingChart {
         let of =
             |level: Level| move |row: &&RateRow| row.giga_per_s.get(level.name()).copied().unwrap_or(0.0);
         let [stepped, packet, bound] = Level::ALL;
-        Table::of(&self.rates)
+        TableBuilder::of(&self.rates)
             .detail("rate", |row| row.rate, plain)
             .detail("stepped", |row| format!("{:.1} G{}", of(stepped)(row), row.unit), plain)
             .detail("packet", of(packet), fixed(1))

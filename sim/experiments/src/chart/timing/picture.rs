@@ -1,6 +1,8 @@
 //! Speed against accuracy of all levels in one picture.
 
-use output::plot::{AxisSpec, Chart, ChartPanel, Mark, Paint, Picture, PlotStyle, Scale, Series, Spread};
+use output::plot::{
+    AxisSpec, Chart, ChartPanel, Paint, Picture, PlotMark, PlotStyle, Scale, Series, SpreadPoint,
+};
 use timing::Level;
 
 use super::animations::SAMPLED;
@@ -19,27 +21,28 @@ impl TimingChart {
     /// hollow for the timing of single frames alone. The frontier is that of the medians of animations, which
     /// are the same for all levels.
     pub(super) fn picture(&self, plot_style: &PlotStyle) -> Picture {
-        let mut series =
-            vec![Series::new("frontier of the medians", Mark::Steps(self.frontier())).painted(Paint::Ink)];
+        let mut series = vec![
+            Series::new("frontier of the medians", PlotMark::Steps(self.frontier())).painted(Paint::Ink),
+        ];
         for (index, level) in LEVELS.into_iter().enumerate() {
             let unnamed =
                 |points: Vec<Point>| points.into_iter().map(|(x, y)| (x, y, String::new())).collect();
             let of_frames = unnamed(self.frames_at(level));
             let of_animations = unnamed(self.animations_at(level));
-            series.push(Series::new("", Mark::Rings(of_frames)).painted(Paint::Like(index)));
-            series.push(Series::new("", Mark::Dots(of_animations)).painted(Paint::Like(index)));
+            series.push(Series::new("", PlotMark::Rings(of_frames)).painted(Paint::Like(index)));
+            series.push(Series::new("", PlotMark::Dots(of_animations)).painted(Paint::Like(index)));
         }
         for (index, level) in LEVELS.into_iter().enumerate() {
             let spread = spread(&self.animations_at(level), level);
             series.push(
-                Series::new("", Mark::Spreads(spread.into_iter().collect())).painted(Paint::Like(index)),
+                Series::new("", PlotMark::Spreads(spread.into_iter().collect())).painted(Paint::Like(index)),
             );
         }
         // Keys of what markers mean, whatever their colour.
         let key = |name: &str, mark| Series::new(name, mark).painted(Paint::Ink);
-        series.push(key("an animation, drawn and timed", Mark::Dots(Vec::new())));
-        series.push(key("a frame, timing alone", Mark::Rings(Vec::new())));
-        series.push(key("median and middle half of animations", Mark::Spreads(Vec::new())));
+        series.push(key("an animation, drawn and timed", PlotMark::Dots(Vec::new())));
+        series.push(key("a frame, timing alone", PlotMark::Rings(Vec::new())));
+        series.push(key("median and middle half of animations", PlotMark::Spreads(Vec::new())));
         let across = AxisSpec { name: "host time relative to stepped".to_owned(), ..AxisSpec::default() };
         let up = AxisSpec {
             name: "error of cycles against stepped (%)".to_owned(),
@@ -74,7 +77,7 @@ impl TimingChart {
     fn medians(&self) -> String {
         let one = |level: &&str| {
             let points = self.animations_at(level);
-            let Spread { at, up, .. } = spread(&points, level)?;
+            let SpreadPoint { at, up, .. } = spread(&points, level)?;
             let (median, [low, high]) = (at.1, up);
             Some(format!("{level} {median:.3} % ({low:.3} to {high:.3} %, {})", points.len()))
         };
@@ -96,12 +99,12 @@ impl TimingChart {
 }
 
 /// Median and the ends of the middle half of both.
-fn spread(points: &[Point], level: &str) -> Option<Spread> {
+fn spread(points: &[Point], level: &str) -> Option<SpreadPoint> {
     points.first()?;
     let (x, y) =
         (quantiles(points.iter().map(|point| point.0)), quantiles(points.iter().map(|point| point.1)));
     let name = level.to_owned();
-    Some(Spread { at: (x(0.5), y(0.5)), across: [x(0.25), x(0.75)], up: [y(0.25), y(0.75)], name })
+    Some(SpreadPoint { at: (x(0.5), y(0.5)), across: [x(0.25), x(0.75)], up: [y(0.25), y(0.75)], name })
 }
 
 #[cfg(test)]

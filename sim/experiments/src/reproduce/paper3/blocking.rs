@@ -6,7 +6,7 @@ use run::RunError;
 use traces::energy::{Pooled, pooled};
 
 use super::super::report::{ENERGY, POWER, TIME, level, line};
-use super::super::row::{Cases, Row, numbers, one_at_a_time};
+use super::super::row::{Cases, ClaimRow, numbers, one_at_a_time};
 use super::super::stage::{MARKED, Stage, looped, objects};
 use super::super::{Done, Figure};
 use super::{Bench, BlockingPhone, FRAME, settled};
@@ -114,7 +114,7 @@ pub(super) fn phone(bench: &Bench<'_>) -> Result<Done, RunError> {
         ("frames_recorded", (recordings * base.new.len() as u64) as f64),
     ]);
     let figures = vec![by_objects(bench, &base), turning(over_waiting), three_frames(bench)?];
-    Ok(Done { row: Row { numbers: facts, ran, ..with.banded(&row.about, ours, band) }, figures })
+    Ok(Done { row: ClaimRow { numbers: facts, ran, ..with.banded(&row.about, ours, band) }, figures })
 }
 
 /// A value, the share of frames for which the old method gives more, and whether it errs both ways.
@@ -293,7 +293,7 @@ pub(super) fn pc(bench: &Bench<'_>) -> Result<Done, RunError> {
         ("recordings", recordings as f64),
         ("frames_found_with_and_without", (with.values + without.values) as f64),
     ]);
-    let row = Row { numbers: facts, ran, ..row_with.banded(&row.about, ours, band) };
+    let row = ClaimRow { numbers: facts, ran, ..row_with.banded(&row.about, ours, band) };
     Ok(Done { row, figures: vec![over_deviation(over_waiting)] })
 }
 

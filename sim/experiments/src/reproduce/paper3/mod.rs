@@ -11,18 +11,18 @@ use traces::energy::{PowerIntegral, Score};
 use traces::frames::FinderMethod;
 
 use super::report::{POWER, TIME, dots, line};
-use super::row::{Row, Verdict, With, numbers};
+use super::row::{ClaimRow, Verdict, With, numbers};
 use super::settings::{
-    About, Form, Origin, Setting, load, paper_settings, reduced, row_settings, settings_group,
+    About, Form, RowSetting, SettingsOrigin, load, paper_settings, reduced, row_settings, settings_group,
 };
 use super::stage::{Frames, MARKED, Stage, TracedRun, looped};
-use super::{Done, Figure, Options, Paper};
+use super::{Done, Figure, Paper, ReproduceOptions};
 
 /// Both machines, with their simulated frames.
 struct Bench<'a> {
     settings: Settings,
     form: Form,
-    origin: Origin,
+    origin: SettingsOrigin,
     pc: Stage,
     pc_frames: Vec<FramePower>,
     phone: Stage,
@@ -113,7 +113,10 @@ pub(super) fn ids() -> Vec<&'static str> {
     ROWS.iter().map(|(id, _)| *id).collect()
 }
 
-pub(super) fn rows(options: &Options, progress: &Progress) -> Result<(Origin, Vec<Done>), RunError> {
+pub(super) fn rows(
+    options: &ReproduceOptions,
+    progress: &Progress,
+) -> Result<(SettingsOrigin, Vec<Done>), RunError> {
     let (settings, origin) = load::<Settings>(options.settings.as_deref())?;
     let form = options.form();
     let (pc, phone) = (Stage::pc()?, Stage::phone()?);
@@ -243,7 +246,7 @@ fn found(bench: &Bench<'_>) -> Result<Done, RunError> {
         shown_frames("III_fig3", "Two frames at 30 Hz (Paper III, Figure 3)", &capped, 2),
         shown_frames("III_fig4", "Three frames without V-sync (Paper III, Figure 4)", &free, 3),
     ];
-    Ok(Done { row: Row { numbers: facts, ran, ..made }, figures })
+    Ok(Done { row: ClaimRow { numbers: facts, ran, ..made }, figures })
 }
 
 /// How well starts were found over several recordings.
@@ -372,5 +375,5 @@ fn sums(bench: &Bench<'_>) -> Result<Done, RunError> {
     ]);
     let verdict = Verdict::of(new < same && old.abs() > same);
     let made = with.row(&with.settings.about, (ours, verdict, String::new()));
-    Ok(Done::bare(Row { numbers: facts, ran, ..made }))
+    Ok(Done::bare(ClaimRow { numbers: facts, ran, ..made }))
 }

@@ -5,7 +5,7 @@ use run::RunError;
 use traces::energy::{Spread, WarmUp, mean_over_discarded, outliers, warm_up as knee};
 
 use super::super::report::{ENERGY, POWER, TIME, by_place, dots, level, line};
-use super::super::row::{Cases, Row, numbers};
+use super::super::row::{Cases, ClaimRow, numbers};
 use super::super::stage::{MARKED, TracedRun, looped};
 use super::super::{Done, Figure};
 use super::{Bench, settled, unflagged};
@@ -126,7 +126,7 @@ pub(super) fn warm_up(bench: &Bench<'_>) -> Result<Done, RunError> {
         on_pc(&pc_energies),
         discarded(&base.energies[0], base.knees[0].frames),
     ];
-    Ok(Done { row: Row { numbers: facts, ran, ..with.banded(&row.about, ours, band) }, figures })
+    Ok(Done { row: ClaimRow { numbers: facts, ran, ..with.banded(&row.about, ours, band) }, figures })
 }
 
 /// Figure 5a: nine frames about the drop.
@@ -308,7 +308,7 @@ pub(super) fn five_seconds(bench: &Bench<'_>) -> Result<Done, RunError> {
         Some(reason) => format!("{}; {reason}", made.note),
     };
     let figures = vec![hit(&base.recording), flagged(&base.energies, &base.flags), growing(bench)?];
-    Ok(Done { row: Row { numbers: facts, ran, note, ..made }, figures })
+    Ok(Done { row: ClaimRow { numbers: facts, ran, note, ..made }, figures })
 }
 
 /// Which frames are flagged wrongly, with how much of them was disturbed.

@@ -7,12 +7,12 @@ use rayon::prelude::*;
 use run::{GpuSpec, RunError};
 use workloads::collision::families::{Case, cases};
 use workloads::collision::{
-    Method, Object, Overlaps, PassWork, PlainPasses, Search, Sweeps, candidates, detect_each,
+    CollisionMethod, Object, Overlaps, PairSearch, PassWork, PlainPasses, Sweeps, candidates, detect_each,
 };
 use workloads::shapes;
 
 use super::super::report::over_doublings;
-use super::super::row::{Cases, Number, Row, numbers};
+use super::super::row::{Cases, ClaimRow, RowNumber, numbers};
 use super::super::{Done, Figure};
 use super::figures::{Ends, overlaps};
 use super::settings::{Moving, Shape, TwoObjects};
@@ -20,16 +20,16 @@ use super::{Pair, Public, Task, any_kept, load_public};
 use crate::reproduce::settings::Form;
 
 /// As the file has it.
-const fn name(method: Method) -> &'static str {
+const fn name(method: CollisionMethod) -> &'static str {
     match method {
-        Method::FragmentBox => "fragment against box",
-        Method::BoxBox => "box against box",
-        Method::DepthOnly => "by depth",
+        CollisionMethod::FragmentBox => "fragment against box",
+        CollisionMethod::BoxBox => "box against box",
+        CollisionMethod::DepthOnly => "by depth",
     }
 }
 
 /// What the modelled hardware drew, and what the host did, as the rows print them.
-fn ran(hardware: &PassWork, host: &PassWork) -> Vec<Number> {
+fn ran(hardware: &PassWork, host: &PassWork) -> Vec<RowNumber> {
     numbers([
         ("passes", hardware.passes as f64),
         ("draws", hardware.draws as f64),
@@ -49,13 +49,13 @@ fn hardware() -> Result<PipelineSpec, RunError> {
 /// Methods and resolutions, each with each. Methods of one resolution compare the same fragments.
 #[derive(Clone, Debug, Default)]
 struct Ways {
-    methods: Vec<Method>,
+    methods: Vec<CollisionMethod>,
     resolutions: Vec<u32>,
 }
 
 impl Ways {
     /// By method, then by resolution.
-    fn each(&self) -> impl Iterator<Item = (Method, u32)> {
+    fn each(&self) -> impl Iterator<Item = (CollisionMethod, u32)> {
         self.methods.iter().flat_map(|&method| self.resolutions.iter().map(move |&px| (method, px)))
     }
 }
@@ -85,7 +85,7 @@ impl Drawn {
     fn on(
         hardware: &PipelineSpec,
         pairs: &[Pair],
-        methods: &[Method],
+        methods: &[CollisionMethod],
         resolution: u32,
     ) -> Result<Self, RunError> {
         let mut drawn = Self { pairs: pairs.len(), ..Self::default() };
@@ -129,7 +129,7 @@ impl Drawn {
 }
 
 /// How many pairs each method clears, and the work of drawing them.
-fn cleared(pairs: &[Pair], methods: &[Method], resolution: u32) -> (Vec<u64>, PassWork) {
+fn cleared(pairs: &[Pair], methods: &[CollisionMethod], resolution: u32) -> (Vec<u64>, PassWork) {
     let none = || (vec![0; methods.len()], PassWork::default());
     let one = |passes: &mut PlainPasses, pair: &Pair| {
         let (overlaps, work) = passes.pair(pair.each_ref(), methods);
@@ -168,7 +168,7 @@ impl Comparisons {
     }
 
     /// Pairs missed by each way.
-    fn missed(&self) -> impl Iterator<Item = (Method, u32, u64)> {
+    fn missed(&self) -> impl Iterator<Item = (CollisionMethod, u32, u64)> {
         self.ways.each().enumerate().map(|(way, (method, px))| {
             let cleared = [&self.generated, &self.collide, &self.swept].map(|drawn| drawn.cleared[way]);
             (method, px, cleared.iter().sum())
@@ -176,7 +176,7 @@ impl Comparisons {
     }
 
     /// All work, and that of each kind of public case that there is.
-    fn ran(&self, hardware: &PassWork) -> Vec<Number> {
+    fn ran(&self, hardware: &PassWork) -> Vec<RowNumber> {
         let Self { generated, collide, apart, swept, .. } = self;
         let mut all =
             ran(hardware, &work_of([generated, collide, apart].map(|drawn| &drawn.work).into_iter()));
@@ -273,11 +273,11 @@ pub(super) fn missed(task: &Task<'_>) -> Result<Done, RunError> {
         ("generated_cases", own.len() as f64),
     ];
     let facts = numbers(counted).into_iter().chain(facts(&comparisons, &public)).collect();
-    Ok(Done::bare(Row { numbers: facts, ran: comparisons.ran(&on_hardware.work), note, ..made }))
+    Ok(Done::bare(ClaimRow { numbers: facts, ran: comparisons.ran(&on_hardware.work), note, ..made }))
 }
 
 /// How many cases of each kind there are, and how many of those that do not collide are kept.
-fn facts(comparisons: &Comparisons, public: &Public) -> Vec<Number> {
+fn facts(comparisons: &Comparisons, public: &Public) -> Vec<RowNumber> {
     let [fewest, most] = comparisons.false_positives().unwrap_or([f64::NAN; 2]);
     let cleared = || comparisons.apart.cleared.iter().copied();
     numbers([
@@ -319,7 +319,7 @@ fn public_text(public: &Public, given: bool) -> String {
 /// Pairs that collide and that `quintile ccd` misses.
 fn missed_closer(pairs: &[Pair]) -> usize {
     let cases: Vec<&[Object]> = pairs.iter().map(Pair::as_slice).collect();
-    let answers = detect_each(&cases, &Search::default(), || ());
+    let answers = detect_each(&cases, &PairSearch::default(), || ());
     answers.iter().filter(|answers| !any_kept(answers)).count()
 }
 
@@ -372,7 +372,7 @@ pub(super) fn dodged(task: &Task<'_>) -> Result<Done, RunError> {
         if let Some(at) = each.iter().find(|at| at.resolution == base) {
             let on =
                 |method| PlainPasses::new(base).pair_on(&pair, method, &hardware).map_err(RunError::from);
-            let ((ours, work), (depth, depth_work)) = (on(methods[0])?, on(Method::DepthOnly)?);
+            let ((ours, work), (depth, depth_work)) = (on(methods[0])?, on(CollisionMethod::DepthOnly)?);
             there = there.and(&work).and(&depth_work);
             let same = if is_distinguished(case, &ours, &depth) { "does the same" } else { "does not" };
             described.push(format!("{}; the modelled hardware {same}", at.text(case)));
@@ -387,7 +387,7 @@ pub(super) fn dodged(task: &Task<'_>) -> Result<Done, RunError> {
         overlaps(&case.name, [&first, &second], *row.resolution_px.get(form))
     };
     let figures = shown.map(figure).into_iter().collect();
-    Ok(Done { row: Row { ran: ran(&there, &drawn), ..made }, figures })
+    Ok(Done { row: ClaimRow { ran: ran(&there, &drawn), ..made }, figures })
 }
 
 /// Whether boxes of time and depth, and of depth alone, say of a case what they have to.
@@ -406,8 +406,8 @@ struct Compared {
 }
 
 impl Compared {
-    fn new(pair: &Pair, methods: &[Method], resolution: u32) -> Self {
-        let all = [methods, &[Method::DepthOnly]].concat();
+    fn new(pair: &Pair, methods: &[CollisionMethod], resolution: u32) -> Self {
+        let all = [methods, &[CollisionMethod::DepthOnly]].concat();
         let (mut ours, work) = PlainPasses::new(resolution).pair(pair.each_ref(), &all);
         let depth = ours.remove(methods.len());
         Self { resolution, ours, depth, work }
@@ -440,7 +440,7 @@ pub(super) fn tighter(task: &Task<'_>) -> Result<Done, RunError> {
     let all = cases(*row.seed.get(form), *row.cases_of_each_family.get(form));
     let mut resolutions = row.resolution_px.all(form).to_vec();
     resolutions.sort_unstable();
-    let methods = [Method::BoxBox, Method::FragmentBox];
+    let methods = [CollisionMethod::BoxBox, CollisionMethod::FragmentBox];
     let at = |&resolution: &u32| -> Vec<(Vec<usize>, PassWork)> {
         all.par_iter().map(|case| false_positives(case, &methods, resolution)).collect()
     };
@@ -486,8 +486,11 @@ pub(super) fn tighter(task: &Task<'_>) -> Result<Done, RunError> {
         ("fragments_on_the_modelled_hardware", kept_there[1] as f64),
     ]);
     let figure = curves(&resolutions, [("fragment against box", &fragments), ("box against box", &boxes)]);
-    let row =
-        Row { numbers: facts, ran: ran(&on_hardware.work, &drawn), ..with.banded(&row.about, ours, band) };
+    let row = ClaimRow {
+        numbers: facts,
+        ran: ran(&on_hardware.work, &drawn),
+        ..with.banded(&row.about, ours, band)
+    };
     Ok(Done { row, figures: vec![figure] })
 }
 
@@ -498,7 +501,7 @@ fn apart(case: &Case) -> impl Iterator<Item = Pair> {
 }
 
 /// Pairs of a case that do not collide and that each method keeps, and what was drawn for that.
-fn false_positives(case: &Case, methods: &[Method], resolution: u32) -> (Vec<usize>, PassWork) {
+fn false_positives(case: &Case, methods: &[CollisionMethod], resolution: u32) -> (Vec<usize>, PassWork) {
     let mut passes = PlainPasses::new(resolution);
     let mut all = (vec![0; methods.len()], PassWork::default());
     for (a, b) in candidates(&case.objects) {
@@ -539,7 +542,10 @@ mod tests {
     }
 
     fn comparisons(public: &Public) -> Comparisons {
-        let ways = Ways { methods: vec![Method::BoxBox, Method::FragmentBox], resolutions: vec![8] };
+        let ways = Ways {
+            methods: vec![CollisionMethod::BoxBox, CollisionMethod::FragmentBox],
+            resolutions: vec![8],
+        };
         Comparisons::new(ways, (&[], &[]), public)
     }
 

@@ -16,22 +16,22 @@ use workloads::visibility::Unshaded;
 
 use super::settings::{Bound, Hardware, QueriedObjects};
 use super::{Task, catalogue};
-use crate::chart::occlusion::{Drawn, Kind, QueryAnswers};
+use crate::chart::occlusion::{Drawn, OcclusionBlur, QueryAnswers};
 use crate::reproduce::Done;
 use crate::reproduce::report::{Figure, over_doublings};
-use crate::reproduce::row::{Cases, Number, Row, Verdict, numbers, one_at_a_time, ran, short};
+use crate::reproduce::row::{Cases, ClaimRow, RowNumber, Verdict, numbers, one_at_a_time, ran, short};
 use crate::study::Ran;
 
-/// Draws the scenes of a kind, with `asked` queried boxes in each.
+/// Draws the scenes of a kind, with `queries` queried boxes in each.
 fn drawn(
-    kind: Kind,
+    kind: OcclusionBlur,
     scenes: u64,
     change: impl Fn(WallSceneSpec) -> WallSceneSpec,
     size: (u32, u32),
     samples: u32,
-    asked: u32,
+    queries: u32,
 ) -> Result<Vec<Drawn>, RunError> {
-    let one = |seed| Drawn::new([size.0, size.1], &change(kind.spec(asked, seed)), samples);
+    let one = |seed| Drawn::new([size.0, size.1], &change(kind.spec(queries, seed)), samples);
     Ok((0..scenes).map(one).collect::<Result<_, _>>()?)
 }
 
@@ -50,9 +50,9 @@ impl Share {
     fn of(scenes: &[Drawn], boxes: [u32; 3], tile_px: u32) -> Result<Self, RunError> {
         let mut share = Self::default();
         for scene in scenes {
-            let asked = scene.ask(boxes, tile_px)?;
-            share.ran += asked.ran;
-            for (answer, seen) in asked.answers.iter().zip(&scene.seen) {
+            let queried = scene.query(boxes, tile_px)?;
+            share.ran += queried.ran;
+            for (answer, seen) in queried.answers.iter().zip(&scene.seen) {
                 let hidden = seen.passed == 0;
                 share.hidden += u64::from(hidden);
                 share.found += u64::from(hidden && answer.hidden);
@@ -78,11 +78,18 @@ struct Rates {
 pub(super) fn rate(task: &Task<'_>) -> Result<Done, RunError> {
     let with = task.with(|settings| &settings.vi_4);
     let (row, form) = (with.settings, with.form);
-    let (size, asked) = (*row.size_px.get(form), *row.asked.get(form));
+    let (size, queries) = (*row.size_px.get(form), *row.asked.get(form));
     let mut total = Share::default();
     let mut measure = |motion: f32, tile_px: u32| -> Result<Vec<(f64, f64)>, RunError> {
         let change = |spec| WallSceneSpec { motion, ..spec };
-        let scenes = drawn(Kind::Motion, *row.yards.get(form), change, size, *row.samples.get(form), asked)?;
+        let scenes = drawn(
+            OcclusionBlur::Motion,
+            *row.yards.get(form),
+            change,
+            size,
+            *row.samples.get(form),
+            queries,
+        )?;
         total.ran += scenes.iter().map(|scene| scene.ran).sum();
         let at = |&boxes: &u32| {
             let share = Share::of(&scenes, [1, 1, boxes], tile_px)?;
@@ -124,12 +131,12 @@ pub(super) fn rate(task: &Task<'_>) -> Result<Done, RunError> {
     let mut ran = ran(&total.ran);
     let queried = [("hidden_objects_queried", total.hidden as f64), ("tiles", total.tiles as f64)];
     ran.extend(numbers(queried));
-    let row = Row { numbers: facts, ran, ..with.banded(&row.about, ours, band) };
+    let row = ClaimRow { numbers: facts, ran, ..with.banded(&row.about, ours, band) };
     Ok(Done { row, figures: vec![rate_figure(curves)] })
 }
 
 /// The result in words and in numbers, with tiles of `tile_px`.
-fn rates_found(curves: &[Rates], tile_px: u32, wrong: u64) -> (String, Vec<Number>) {
+fn rates_found(curves: &[Rates], tile_px: u32, wrong: u64) -> (String, Vec<RowNumber>) {
     let base = curves.iter().find(|rates| rates.tile_px == tile_px).map(|rates| &rates.found);
     let listed: Vec<String> =
         base.into_iter().flatten().map(|(boxes, rate)| format!("{boxes}: {rate:.3}")).collect();
@@ -178,13 +185,13 @@ struct Costs {
 impl Costs {
     /// Over the queried objects; `charged` is the share of gathering the farthest depths that queries pay
     /// for. Of the two sampled queries, that which ends early costs less.
-    fn of(scenes: &[(Drawn, QueryAnswers)], asked: QueriedObjects, charged: f64) -> Self {
+    fn of(scenes: &[(Drawn, QueryAnswers)], queried: QueriedObjects, charged: f64) -> Self {
         let mut costs = Self::default();
         for (scene, answered) in scenes {
             let share = charged / answered.answers.len().max(1) as f64;
             let gathered = [answered.gathered, answered.gathered_bytes].map(|count| share * count as f64);
             for (answer, seen) in answered.answers.iter().zip(&scene.seen) {
-                if asked == QueriedObjects::All || seen.passed == 0 {
+                if queried == QueriedObjects::All || seen.passed == 0 {
                     costs.add(seen, answer, gathered);
                 }
             }
@@ -217,13 +224,13 @@ fn least(all: &[Costs]) -> [f64; 3] {
 pub(super) fn cost(task: &Task<'_>) -> Result<Done, RunError> {
     let with = task.with(|settings| &settings.vi_5);
     let (row, form) = (with.settings, with.form);
-    let (size, asked, tile_px) = (*row.size_px.get(form), *row.asked.get(form), *row.tile_px.get(form));
+    let (size, queries, tile_px) = (*row.size_px.get(form), *row.asked.get(form), *row.tile_px.get(form));
     let mut queried = Vec::new();
-    for kind in Kind::ALL {
+    for kind in OcclusionBlur::ALL {
         for &samples in row.samples.get(form) {
-            let scenes = drawn(kind, *row.yards.get(form), |spec| spec, size, samples, asked)?;
+            let scenes = drawn(kind, *row.yards.get(form), |spec| spec, size, samples, queries)?;
             let answered = |scene: Drawn| {
-                let answered = scene.ask(kind.typical(), tile_px)?;
+                let answered = scene.query(kind.typical(), tile_px)?;
                 Ok((scene, answered))
             };
             queried.push(scenes.into_iter().map(answered).collect::<Result<Vec<_>, RunError>>()?);
@@ -274,7 +281,7 @@ pub(super) fn cost(task: &Task<'_>) -> Result<Done, RunError> {
         ("sampled_tests", base.iter().map(|costs| costs.sampled[0]).sum()),
         ("interval_tests", base.iter().map(|costs| costs.interval[0]).sum()),
     ]));
-    Ok(Done::bare(Row { numbers: facts, ran, ..with.banded(&row.about, ours, band) }))
+    Ok(Done::bare(ClaimRow { numbers: facts, ran, ..with.banded(&row.about, ours, band) }))
 }
 
 impl Hardware {
@@ -485,7 +492,7 @@ pub(super) fn unchanged(task: &Task<'_>) -> Result<Done, RunError> {
     ]);
     let made =
         with.row(&row.about, (ours, Verdict::of(total.differ == 0 && total.samples > 0), String::new()));
-    Ok(Done::bare(Row { numbers: facts, ran, ..made }))
+    Ok(Done::bare(ClaimRow { numbers: facts, ran, ..made }))
 }
 
 #[cfg(test)]

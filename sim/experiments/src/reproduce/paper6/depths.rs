@@ -19,10 +19,10 @@ use workloads::visibility::Unshaded;
 use super::settings::{Depths, Mode, Planes, Triangles};
 use super::{Task, catalogue};
 use crate::reproduce::report::line;
-use crate::reproduce::row::{Cases, Row, numbers, ran};
+use crate::reproduce::row::{Band, Cases, ClaimRow, numbers, ran};
 use crate::reproduce::settings::Form;
 use crate::reproduce::{Done, Figure};
-use crate::stress::measure::Place;
+use crate::stress::measure::TilePlace;
 use crate::study::Ran;
 
 /// Widths of depth intervals in tiles, over those of the vertices.
@@ -145,46 +145,63 @@ impl AgainstNull {
     }
 }
 
+/// All widths of the row, by mode, triangles and size of tiles.
+#[derive(Default)]
+struct AllWidths {
+    described: Vec<String>,
+    /// By the planes at the ends of the tile's own time, in standard mode with the tiles given.
+    locals: Vec<String>,
+    total: Widths,
+    against_null: AgainstNull,
+    /// Of the first widths in standard mode with the tiles given.
+    figure: Option<Figure>,
+}
+
+impl AllWidths {
+    fn measure(all: &Scenes<'_>, row: &Depths, form: Form) -> Result<(Self, Band), RunError> {
+        let (mut tried, mut found) = (Cases::new(OF, VARIED), Self::default());
+        for &mode in row.mode.all(form) {
+            let sides = match mode {
+                Mode::Standard => row.tile_px.all(form).to_vec(),
+                Mode::Conservative => vec![*row.conservative_tile_px.get(form)],
+            };
+            for &triangles in row.triangles.all(form) {
+                let name = triangles_name(triangles);
+                let mut at = Vec::new();
+                for &side in &sides {
+                    let widths = all.measure(mode, triangles, side)?;
+                    found.add(&format!("{}, {name}, tiles of {side} px", mode_name(mode)), &widths);
+                    at.push((side, widths.number(), widths.holds()));
+                    if mode == Mode::Standard && side == *row.tile_px.get(form) {
+                        found.locals.push(format!("{:.3} ({name})", widths.means(1)[0]));
+                        found.figure.get_or_insert_with(|| cumulative(&widths));
+                    }
+                }
+                tried.along(&format!("tile_px ({}, {name})", mode_name(mode)), at);
+            }
+        }
+        let full = row.triangles.values() * (row.tile_px.values() + row.mode.values() - 1);
+        Ok((found, tried.band(full)?))
+    }
+
+    fn add(&mut self, what: &str, widths: &Widths) {
+        self.described.push(widths.text(what));
+        self.against_null.add(widths);
+        let Widths { violations, places, triangles, tiles, .. } = widths;
+        self.total.violations += violations;
+        self.total.places += places;
+        self.total.triangles += triangles;
+        self.total.tiles[0] += tiles[0] + tiles[1];
+    }
+}
+
 /// VI-15.
 pub(super) fn tighter(task: &Task<'_>) -> Result<Done, RunError> {
     let with = task.with(|settings| &settings.vi_15);
     let (row, form) = (with.settings, with.form);
     let all = Scenes::new(row, form)?;
-    let (mut tried, mut described, mut total) = (Cases::new(OF, VARIED), Vec::new(), Widths::default());
-    let mut against_null = AgainstNull::default();
-    let mut keep = |what: String, widths: &Widths| {
-        described.push(widths.text(&what));
-        against_null.add(widths);
-        let Widths { violations, places, triangles, tiles, .. } = widths;
-        total.violations += violations;
-        total.places += places;
-        total.triangles += triangles;
-        total.tiles[0] += tiles[0] + tiles[1];
-    };
-    let mut figure = None;
-    let (base, mut locals) = (*row.tile_px.get(form), Vec::new());
-    for &mode in row.mode.all(form) {
-        let sides = match mode {
-            Mode::Standard => row.tile_px.all(form).to_vec(),
-            Mode::Conservative => vec![*row.conservative_tile_px.get(form)],
-        };
-        for &triangles in row.triangles.all(form) {
-            let mut at = Vec::new();
-            for &side in &sides {
-                let widths = all.measure(mode, triangles, side)?;
-                let what = format!("{}, {}, tiles of {side} px", mode_name(mode), triangles_name(triangles));
-                keep(what, &widths);
-                at.push((side, widths.number(), widths.holds()));
-                if mode == Mode::Standard && side == base {
-                    locals.push(format!("{:.3} ({})", widths.means(1)[0], triangles_name(triangles)));
-                    figure.get_or_insert_with(|| cumulative(&widths));
-                }
-            }
-            tried.along(&format!("tile_px ({}, {})", mode_name(mode), triangles_name(triangles)), at);
-        }
-    }
-    let full = row.triangles.values() * (row.tile_px.values() + row.mode.values() - 1);
-    let band = tried.band(full)?;
+    let (widths, band) = AllWidths::measure(&all, row, form)?;
+    let AllWidths { described, locals, total, against_null, figure } = widths;
     let ours = format!(
         "{}; by the planes at the ends of the tile's own time, in standard mode: {}",
         described.join("; "),
@@ -211,7 +228,7 @@ pub(super) fn tighter(task: &Task<'_>) -> Result<Done, RunError> {
     let figures = figure.into_iter().collect();
     let made = with.banded(&row.about, ours, band);
     let note = format!("{}; {}", made.note, against_null.text());
-    Ok(Done { row: Row { numbers: facts, ran, note, ..made }, figures })
+    Ok(Done { row: ClaimRow { numbers: facts, ran, note, ..made }, figures })
 }
 
 const OF: &str = "width where the facing changes over that elsewhere";
@@ -387,8 +404,13 @@ impl<'a> Alone<'a> {
             if count == 0 {
                 continue;
             }
-            let place =
-                Place::new(self.scene.viewport, self.projection.shear, self.projection.near, [x, y], side_px);
+            let place = TilePlace::new(
+                self.scene.viewport,
+                self.projection.shear,
+                self.projection.near,
+                [x, y],
+                side_px,
+            );
             let Some(within) = place.bound(&Features::ALL, &self.triangle) else {
                 widths.violations += 1;
                 continue;

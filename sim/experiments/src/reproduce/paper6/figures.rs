@@ -4,13 +4,13 @@
 use std::path::Path;
 
 use glam::{Affine3A, DVec3, Vec3, dvec3};
-use output::plot::{CaptionedImage, HeatMapPlot, HeatTile, Images, PlotStyle, Shading};
+use output::plot::{CaptionedImage, HeatMapPlot, HeatScale, HeatTile, Images, PlotStyle};
 use pipeline::conservative::{Grid, MovingTriangle, Rasterizer, View};
 use pipeline::{Camera, Cull, Draw, Geometry, Gpu, LensShape, RasterPass, SampleTable, Viewport};
 use run::{GpuSpec, RunError};
 use workloads::caustics::generator::Ocean;
-use workloads::caustics::{Beam, Eye, Floor, Light, Method, Picture, draw};
-use workloads::job::{OptionSource, Request};
+use workloads::caustics::{Beam, BeamMethod, DrawnLight, Eye, Floor, LightPicture, draw};
+use workloads::job::{JobRequest, OptionSource};
 use workloads::material::Light as SceneLight;
 use workloads::material::{Material, SurfaceShader};
 use workloads::points::job::Rasterized;
@@ -39,7 +39,7 @@ fn drawn(
     caption: &str,
 ) -> Result<CaptionedImage, RunError> {
     let set = set.iter().map(|(option, value)| ((*option).to_owned(), value.clone())).collect();
-    let (options, request) = (OptionSource { file: None, set }, Request { overrides, seed: 1 });
+    let (options, request) = (OptionSource { file: None, set }, JobRequest { overrides, seed: 1 });
     let (_, job) = catalog::load(Path::new(name), &options, &request)?;
     let gpu = GpuSpec::load("reference")?;
     let mut on = Gpu::without_packets(&gpu.pipeline)?;
@@ -295,10 +295,10 @@ const PANEL_PX: [u32; 2] = [120, 160];
 /// Figure 7: which pixels each method shades for one warped beam, and in which of them there is light.
 pub(super) fn warped() -> Result<Figure, RunError> {
     let eye = beside().ok_or_else(|| RunError::setting("a view without extent"))?;
-    let pictures = Method::ALL.map(|method| draw(&[twisted()], &eye, method, Some(Light::Volume)));
+    let pictures = BeamMethod::ALL.map(|method| draw(&[twisted()], &eye, method, Some(DrawnLight::Volume)));
     let tiles: Vec<HeatTile> =
         (0..).zip(&pictures).flat_map(|(panel, picture)| areas_of(panel, picture)).collect();
-    let areas = Method::ALL.iter().zip(&pictures);
+    let areas = BeamMethod::ALL.iter().zip(&pictures);
     let areas: Vec<String> = areas
         .map(|(method, picture)| {
             format!("{} {}", method.name(), picture.runs.iter().filter(|runs| **runs > 0).count())
@@ -310,7 +310,7 @@ pub(super) fn warped() -> Result<Figure, RunError> {
         label: "",
         size: [4 * PANEL_PX[0], PANEL_PX[1]],
         tiles: &tiles,
-        shading: Shading::Classes(&["not shaded", "shaded without light", "shaded with light"]),
+        shading: HeatScale::Classes(&["not shaded", "shaded without light", "shaded with light"]),
         brightness: &[],
     };
     Ok(Figure { name: "VI_fig7", picture: map.picture(&PlotStyle::default()) })
@@ -322,7 +322,7 @@ fn beside() -> Option<Eye> {
 }
 
 /// Runs of equal pixels in a row: 0 not shaded, 1 wasted, 2 with light.
-fn areas_of(panel: u32, picture: &Picture) -> Vec<HeatTile> {
+fn areas_of(panel: u32, picture: &LightPicture) -> Vec<HeatTile> {
     let width = PANEL_PX[0];
     let kinds = picture.runs.iter().zip(&picture.light);
     let kinds: Vec<u32> = kinds.map(|(runs, light)| u32::from(*runs > 0) + u32::from(*light > 0.0)).collect();
@@ -354,21 +354,21 @@ pub(super) fn light(form: Form) -> Result<[Figure; 2], RunError> {
     let beams = water.beams(0.0);
     let aside = measure::aside([width, height])?;
     let above = measure::above(height)?;
-    let floor = Light::Floor(Floor { height_m: -measure::DEPTH_M });
+    let floor = DrawnLight::Floor(Floor { height_m: -measure::DEPTH_M });
     let image = |name, what: &str, label: &str, eye: &Eye, light| {
-        let picture = draw(&beams, eye, Method::Moving, Some(light));
+        let picture = draw(&beams, eye, BeamMethod::Moving, Some(light));
         let subject =
             format!("{} beams as moving triangles, waves of slope {}; {what}", beams.len(), measure::SLOPE);
         let size = [eye.viewport().width(), eye.viewport().height()];
         let title = "Caustics under waves (Paper VI, section 4)";
         let tiles = &tiles(&picture.light, size[0]);
         // Next to a focus light has no bound.
-        let shading = Shading::Clipped;
+        let shading = HeatScale::Clipped;
         let map = HeatMapPlot { title, subject: &subject, label, size, tiles, shading, brightness: &[] };
         Figure { name, picture: map.picture(&PlotStyle::default()) }
     };
     Ok([
-        image("VI_caustics_volume", "in the water, from the side", "W/m", &aside, Light::Volume),
+        image("VI_caustics_volume", "in the water, from the side", "W/m", &aside, DrawnLight::Volume),
         image("VI_caustics_floor", "on the floor, from above", "W/m2", &above, floor),
     ])
 }
@@ -421,7 +421,7 @@ mod tests {
     fn every_body_has_more_pixels_than_the_beam() {
         let eye = Eye::new([dvec3(1.2, 1.6, 8.0), dvec3(0.0, -1.0, 0.0), DVec3::Y], 1.7, PANEL_PX).unwrap();
         let area = |method| draw(&[twisted()], &eye, method, None).total_runs();
-        let [moving, refined, hull, prism] = Method::ALL.map(area);
+        let [moving, refined, hull, prism] = BeamMethod::ALL.map(area);
         assert!(moving < refined && refined <= hull && hull < prism, "{moving} {refined} {hull} {prism}");
     }
 }

@@ -8,19 +8,21 @@ use pipeline::{FrameReport, Gpu};
 use run::{GpuSpec, RunError};
 use workloads::Overrides;
 use workloads::caustics::generator::{Ocean, turned_beams};
-use workloads::caustics::{Beam, Coverage, Eye, Floor, Light, Method, Picture, draw_on, receivers};
-use workloads::glossy::Effect;
+use workloads::caustics::{
+    Beam, BeamMethod, Coverage, DrawnLight, Eye, Floor, LightPicture, draw_on, receivers,
+};
+use workloads::glossy::GlossyEffect;
 use workloads::job::{Drawn, Job};
 use workloads::soft_shadows::{SoftShadowOptions, SoftShadows};
 
 use super::Task;
 use super::figures::{self, light, warped};
-use super::settings::{Glossy, Lost, Size};
+use super::settings::{Executions, Glossy, Lost, Size};
 use crate::chart::caustics::measure::{DEPTH_M, SIDE_M, WAVE_M, aside_of, water};
 use crate::chart::caustics::{OceanCounts, ocean};
-use crate::chart::glossy::{Bench, Blur, GlossyEffort, GlossyRow as Measured};
+use crate::chart::glossy::{Blur, GlossyBench, GlossyEffort, GlossyRow as Measured};
 use crate::reproduce::report::line;
-use crate::reproduce::row::{Cases, Row, Verdict, numbers, one_at_a_time, ran};
+use crate::reproduce::row::{Band, Cases, ClaimRow, RowNumber, Verdict, numbers, one_at_a_time, ran};
 use crate::reproduce::settings::Form;
 use crate::reproduce::{Done, Figure};
 use crate::study::{Ran, StudyError};
@@ -31,35 +33,66 @@ fn over_fewer(counted: &OceanCounts) -> f64 {
     moving as f64 / refined.min(prism) as f64
 }
 
+/// Oceans of several slopes and depths, one varied at a time about the values given.
+struct Oceans {
+    base: OceanCounts,
+    slopes: Vec<(f64, OceanCounts)>,
+    depths: Vec<(f64, OceanCounts)>,
+}
+
+impl Oceans {
+    fn new(task: &Task<'_>, row: &Executions, form: Form) -> Result<Self, RunError> {
+        let (slope, depth_m) = (*row.slope.get(form), *row.depth_m.get(form));
+        let size = *row.size_px.get(form);
+        let count = |slope: f64, depth_m: f64| -> Result<OceanCounts, RunError> {
+            Ok(ocean(*row.cells.get(form), [slope, depth_m], [size.0, size.1], task.progress)?)
+        };
+        let base = count(slope, depth_m)?;
+        let of_slope = |at: f64| Ok((at, if at == slope { base.clone() } else { count(at, depth_m)? }));
+        let of_depth = |&at: &f64| Ok((at, if at == depth_m { base.clone() } else { count(slope, at)? }));
+        let mut slopes = row.slope.all(form).to_vec();
+        slopes.sort_by(f64::total_cmp);
+        let slopes = slopes.into_iter().map(of_slope).collect::<Result<_, RunError>>()?;
+        let depths = row.depth_m.all(form).iter().map(of_depth).collect::<Result<_, RunError>>()?;
+        Ok(Self { base, slopes, depths })
+    }
+
+    /// Whether the moving triangles have the fewest executions in every one.
+    fn band(&self, row: &Executions, form: Form) -> Result<Band, RunError> {
+        let mut tried = Cases::new(
+            "executions over those of the bounding volume with fewer",
+            "slope and depth_m one at a time about the values given",
+        );
+        let judged =
+            |(at, counted): &(f64, OceanCounts)| (*at, over_fewer(counted), over_fewer(counted) < 1.0);
+        tried.along("slope", self.slopes.iter().map(judged)).with_base(*row.slope.get(form));
+        tried.along("depth_m", self.depths.iter().map(judged)).with_base(*row.depth_m.get(form));
+        tried.band(one_at_a_time([row.slope.values(), row.depth_m.values()]))
+    }
+
+    /// Work on the host. The ocean of the values given is in both sweeps and was drawn once.
+    fn ran(&self, depth_m: f64) -> Vec<RowNumber> {
+        let others = self.depths.iter().filter(|(at, _)| *at != depth_m).chain(&self.slopes);
+        let drawn: Vec<&OceanCounts> = others.map(|(_, counted)| counted).collect();
+        let draws: u64 = drawn.iter().map(|counted| counted.draws).sum();
+        let fragments: u64 = drawn.iter().flat_map(|counted| counted.executions).sum();
+        numbers([
+            ("draws_on_the_host", draws as f64),
+            ("fragments_on_the_host", fragments as f64),
+            ("volumes", self.base.volumes as f64),
+            ("oceans_on_the_host", drawn.len() as f64),
+        ])
+    }
+}
+
 /// VI-6: shader executions by method on an ocean of 130,050 volumes.
 pub(super) fn executions(task: &Task<'_>) -> Result<Done, RunError> {
     let with = task.with(|settings| &settings.vi_6);
     let (row, form) = (with.settings, with.form);
-    let size = *row.size_px.get(form);
-    let count = |slope: f64, depth_m: f64| {
-        ocean(*row.cells.get(form), [slope, depth_m], [size.0, size.1], task.progress).map_err(RunError::from)
-    };
-    let (slope, depth_m) = (*row.slope.get(form), *row.depth_m.get(form));
-    let base = count(slope, depth_m)?;
-    let mut slopes = row.slope.all(form).to_vec();
-    slopes.sort_by(f64::total_cmp);
-    let counted = |at: f64| if at == slope { Ok(base.clone()) } else { count(at, depth_m) };
-    let slopes: Vec<(f64, OceanCounts)> =
-        slopes.into_iter().map(|at| Ok((at, counted(at)?))).collect::<Result<_, RunError>>()?;
-    let mut depths = Vec::new();
-    for &at in row.depth_m.all(form) {
-        let counted = if at == depth_m { base.clone() } else { count(slope, at)? };
-        depths.push((at, counted));
-    }
-    let mut tried = Cases::new(
-        "executions over those of the bounding volume with fewer",
-        "slope and depth_m one at a time about the values given",
-    );
-    let judged = |(at, counted): &(f64, OceanCounts)| (*at, over_fewer(counted), over_fewer(counted) < 1.0);
-    tried.along("slope", slopes.iter().map(judged)).with_base(slope);
-    tried.along("depth_m", depths.iter().map(judged)).with_base(depth_m);
-    let full = one_at_a_time([row.slope.values(), row.depth_m.values()]);
-    let band = tried.band(full)?;
+    let oceans = Oceans::new(task, row, form)?;
+    let band = oceans.band(row, form)?;
+    let base = &oceans.base;
+    let (size, slope, depth_m) = (*row.size_px.get(form), *row.slope.get(form), *row.depth_m.get(form));
     let [moving, refined, hull, prism] = base.executions;
     let part = |total: u64| total as f64 / prism as f64;
     let ours = format!(
@@ -80,26 +113,16 @@ pub(super) fn executions(task: &Task<'_>) -> Result<Done, RunError> {
         ("most_of_a_pixel_moving", f64::from(base.most[0])),
         ("most_of_a_pixel_prism", f64::from(base.most[3])),
     ]);
-    // The ocean of the values given is in both sweeps and was drawn once.
-    let others = depths.iter().filter(|(at, _)| *at != depth_m).chain(&slopes).map(|(_, counted)| counted);
-    let drawn: Vec<&OceanCounts> = others.collect();
-    let draws: u64 = drawn.iter().map(|counted| counted.draws).sum();
-    let fragments: u64 = drawn.iter().flat_map(|counted| counted.executions).sum();
     let (there, on_hardware) = base_on_hardware(*row.cells.get(form), [slope, depth_m], [size.0, size.1])?;
     let same = if on_hardware == base.executions { "the same" } else { "others" };
     let ours = format!("{ours}; the modelled hardware counts {same} by all methods");
     let mut ran = ran(&there);
-    ran.extend(numbers([
-        ("draws_on_the_host", draws as f64),
-        ("fragments_on_the_host", fragments as f64),
-        ("volumes", base.volumes as f64),
-        ("oceans_on_the_host", drawn.len() as f64),
-    ]));
-    let row = Row { numbers: facts, ran, ..with.banded(&row.about, ours, band) };
-    Ok(Done { row, figures: figures(&base, &slopes, form)? })
+    ran.extend(oceans.ran(depth_m));
+    let row = ClaimRow { numbers: facts, ran, ..with.banded(&row.about, ours, band) };
+    Ok(Done { row, figures: figures(base, &oceans.slopes, form)? })
 }
 
-/// Work and executions of the modelled hardware on the ocean of the values given, by method as in [`Method::ALL`].
+/// Work and executions of the modelled hardware on the ocean of the values given, by method as in [`BeamMethod::ALL`].
 fn base_on_hardware(
     cells: u32,
     [slope, depth_m]: [f64; 2],
@@ -109,8 +132,8 @@ fn base_on_hardware(
     let eye = aside_of(depth_m, size)?;
     let (beams, mut work) = (water.beams(0.0), Ran::default());
     let mut executions = [0; 4];
-    for (method, executions) in Method::ALL.into_iter().zip(&mut executions) {
-        let (picture, of_method) = on_hardware(&beams, &eye, method, Light::Volume)?;
+    for (method, executions) in BeamMethod::ALL.into_iter().zip(&mut executions) {
+        let (picture, of_method) = on_hardware(&beams, &eye, method, DrawnLight::Volume)?;
         work += of_method;
         *executions = picture.total_runs();
     }
@@ -118,7 +141,12 @@ fn base_on_hardware(
 }
 
 /// What the modelled hardware draws of beams.
-fn on_hardware(beams: &[Beam], eye: &Eye, method: Method, light: Light) -> Result<(Picture, Ran), RunError> {
+fn on_hardware(
+    beams: &[Beam],
+    eye: &Eye,
+    method: BeamMethod,
+    light: DrawnLight,
+) -> Result<(LightPicture, Ran), RunError> {
     let spec = GpuSpec::load("reference")?.pipeline;
     let mut gpu = Gpu::without_packets(&spec)?;
     let (picture, _) = draw_on(&mut gpu, beams, eye, method, light)?;
@@ -127,9 +155,9 @@ fn on_hardware(beams: &[Beam], eye: &Eye, method: Method, light: Light) -> Resul
 
 fn figures(base: &OceanCounts, slopes: &[(f64, OceanCounts)], form: Form) -> Result<Vec<Figure>, RunError> {
     let maps = [
-        ("VI_fig8_moving", Method::Moving),
-        ("VI_fig8_refined", Method::Refined),
-        ("VI_fig8_prism", Method::Prism),
+        ("VI_fig8_moving", BeamMethod::Moving),
+        ("VI_fig8_refined", BeamMethod::Refined),
+        ("VI_fig8_prism", BeamMethod::Prism),
     ];
     let mut figures = vec![warped()?, over_slopes(slopes)];
     figures
@@ -140,7 +168,7 @@ fn figures(base: &OceanCounts, slopes: &[(f64, OceanCounts)], form: Form) -> Res
 
 /// The sweep of slopes: executions over those of the prism.
 fn over_slopes(slopes: &[(f64, OceanCounts)]) -> Figure {
-    let of = |(place, method): (usize, Method)| -> Series {
+    let of = |(place, method): (usize, BeamMethod)| -> Series {
         let part = |counted: &OceanCounts| counted.executions[place] as f64 / counted.executions[3] as f64;
         line(method.name(), slopes.iter().map(|(slope, counted)| (*slope, part(counted))).collect())
     };
@@ -149,7 +177,7 @@ fn over_slopes(slopes: &[(f64, OceanCounts)]) -> Figure {
         "Shader executions over the slope of the waves (Paper VI, section 4)",
         "over those of the prism; the paper does not give the slope of its ocean",
         [("root mean square slope", ""), ("executions over the prism's", "")],
-        Method::ALL.into_iter().enumerate().map(of).collect(),
+        BeamMethod::ALL.into_iter().enumerate().map(of).collect(),
     )
 }
 
@@ -207,7 +235,7 @@ pub(super) fn no_light_is_lost(task: &Task<'_>) -> Result<Done, RunError> {
         ("fragments_on_the_host", all.fragments as f64),
     ]));
     ran.extend(numbers(pairs));
-    Ok(Done::bare(Row { numbers: facts, ran, ..with.banded(&row.about, ours, band) }))
+    Ok(Done::bare(ClaimRow { numbers: facts, ran, ..with.banded(&row.about, ours, band) }))
 }
 
 fn eye(place: [DVec3; 3], half_height: f64, size: &Size) -> Result<Eye, RunError> {
@@ -236,8 +264,8 @@ fn turned(row: &Lost, form: Form, height_m: f64) -> Result<(Coverage, Ran), RunE
 /// Which receivers on a floor are covered, which the host finds, and what the modelled hardware draws of the
 /// same beams.
 fn covered(beams: &[Beam], eye: &Eye, floor: Floor) -> Result<(Coverage, Ran), RunError> {
-    let (_, drawn) = on_hardware(beams, eye, Method::Moving, Light::Floor(floor))?;
-    Ok((receivers(beams, eye, Method::Moving, &floor), drawn))
+    let (_, drawn) = on_hardware(beams, eye, BeamMethod::Moving, DrawnLight::Floor(floor))?;
+    Ok((receivers(beams, eye, BeamMethod::Moving, &floor), drawn))
 }
 
 /// Errors of the map by few and by many samples, of reflection and of refraction, and blurs by height.
@@ -254,14 +282,14 @@ impl Found {
             most_samples: many,
             reference_tables: *row.reference_tables.get(form),
         };
-        let bench = |effect| Bench::new(effect, size).map(|bench| bench.with_radius(radius));
+        let bench = |effect| GlossyBench::new(effect, size).map(|bench| bench.with_radius(radius));
         let errors = |effect| -> Result<[Measured; 2], StudyError> {
             let bench = bench(effect)?;
             let reference = bench.reference(radius)?;
             Ok([bench.row(few, &reference)?, bench.row(many, &reference)?])
         };
-        let reflection = ("reflection", Effect::Reflection);
-        let errors = [errors(reflection)?, errors(("refraction", Effect::Refraction(index)))?];
+        let reflection = ("reflection", GlossyEffect::Reflection);
+        let errors = [errors(reflection)?, errors(("refraction", GlossyEffect::Refraction(index)))?];
         Ok(Self { errors, blurs: bench(reflection)?.blurs()? })
     }
 
@@ -281,9 +309,8 @@ impl Found {
     }
 }
 
-pub(super) fn glossy_row(task: &Task<'_>) -> Result<Done, RunError> {
-    let with = task.with(|settings| &settings.vi_11);
-    let (row, form) = (with.settings, with.form);
+/// What is found by the values given, what by others about them, and how many settings were drawn.
+fn varied(row: &Glossy, form: Form) -> Result<(Found, Band, u32), RunError> {
     let found = |settings| Found::new(row, form, settings).map_err(RunError::from);
     let (radius, index) = (*row.lens_radius.get(form), *row.index.get(form));
     let mut tried = Cases::new(
@@ -314,8 +341,14 @@ pub(super) fn glossy_row(task: &Task<'_>) -> Result<Done, RunError> {
         at.push((one, found.ratio(), found.falls() && found.hardens(off)));
     }
     tried.along("index", at).with_base(index);
-    let full = one_at_a_time([row.lens_radius.values(), row.index.values()]);
-    let band = tried.band(full)?;
+    let band = tried.band(one_at_a_time([row.lens_radius.values(), row.index.values()]))?;
+    Ok((base, band, runs))
+}
+
+pub(super) fn glossy_row(task: &Task<'_>) -> Result<Done, RunError> {
+    let with = task.with(|settings| &settings.vi_11);
+    let (row, form) = (with.settings, with.form);
+    let (base, band, runs) = varied(row, form)?;
     let [reflected, refracted] = base.errors.map(|both| both.map(|row| row.rmse));
     let (first, last) = (&base.blurs[0], &base.blurs[base.blurs.len() - 1]);
     let ours = format!(
@@ -343,9 +376,10 @@ pub(super) fn glossy_row(task: &Task<'_>) -> Result<Done, RunError> {
         ("vertices", measured().map(|row| row.vertices as f64).sum()),
         ("samples_tested", measured().map(|row| row.samples_tested as f64).sum()),
     ]));
+    let (radius, index) = (*row.lens_radius.get(form), *row.index.get(form));
     let pictures = figures::glossy(*row.texels.get(form), radius, index, *row.samples.get(form))?;
     Ok(Done {
-        row: Row { numbers: facts, ran, ..with.banded(&row.about, ours, band) },
+        row: ClaimRow { numbers: facts, ran, ..with.banded(&row.about, ours, band) },
         figures: vec![contact(&base.blurs), pictures],
     })
 }
@@ -411,5 +445,5 @@ pub(super) fn shadow_row(task: &Task<'_>) -> Result<Done, RunError> {
         ("fragments_of_accumulation", of_many.fragments as f64),
     ]));
     let made = with.row(&row.about, (ours, Verdict::of(same), String::new()));
-    Ok(Done::bare(Row { numbers: facts, ran, ..made }))
+    Ok(Done::bare(ClaimRow { numbers: facts, ran, ..made }))
 }

@@ -20,20 +20,20 @@ use flate2::read::GzDecoder;
 use output::terminal::Progress;
 use run::RunError;
 use settings::Settings;
-use workloads::collision::{Answer, Object, Search, detect, detect_each};
+use workloads::collision::{Object, PairAnswer, PairSearch, detect, detect_each};
 use workloads::stress::{Size, StressScene, families};
 use workloads::visibility::load_mts;
 
 use self::settings::PublicScene;
 use super::row::With;
-use super::settings::{Form, Origin, load};
-use super::{Done, Options};
+use super::settings::{Form, SettingsOrigin, load};
+use super::{Done, ReproduceOptions};
 
 /// Input of every row.
 struct Task<'a> {
     settings: Settings,
     form: Form,
-    origin: Origin,
+    origin: SettingsOrigin,
     /// Public cases of collision detection.
     collision_data: Option<&'a Path>,
     progress: &'a Progress,
@@ -80,7 +80,10 @@ pub(super) fn ids() -> Vec<&'static str> {
     ROWS.iter().map(|(id, _)| *id).collect()
 }
 
-pub(super) fn rows(options: &Options, progress: &Progress) -> Result<(Origin, Vec<Done>), RunError> {
+pub(super) fn rows(
+    options: &ReproduceOptions,
+    progress: &Progress,
+) -> Result<(SettingsOrigin, Vec<Done>), RunError> {
     let (settings, origin) = load::<Settings>(options.settings.as_deref())?;
     let task = Task {
         settings,
@@ -217,14 +220,14 @@ impl Public {
         let objects = objects.ok_or_else(|| {
             RunError::invalid(path.display(), "a coordinate is beyond 1e60 or not a number")
         })?;
-        let answers = detect(&objects, &Search::default());
+        let answers = detect(&objects, &PairSearch::default());
         let kept = answers.iter().filter(|answer| answer.verdict.may_collide());
         let seen: Vec<_> = kept.clone().filter(|answer| answer.verdict.is_contact()).collect();
         self.scenes += 1;
         self.known += scene.collide;
         self.seen += seen.len().min(scene.collide);
         self.missed_closer += scene.collide.saturating_sub(kept.count());
-        let pair = |answer: &&Answer| [answer.a, answer.b].map(|n| objects[n].clone());
+        let pair = |answer: &&PairAnswer| [answer.a, answer.b].map(|n| objects[n].clone());
         self.collide.extend(seen.iter().map(pair));
         Ok(())
     }
@@ -237,8 +240,10 @@ impl Public {
         let pairs: Option<Vec<Pair>> = rows.chunks_exact(8).map(pair).collect();
         let pairs = pairs.ok_or_else(|| RunError::invalid(path.display(), "a coordinate is beyond 1e60"))?;
         let cases: Vec<&[Object]> = pairs.iter().map(Pair::as_slice).collect();
-        let kept: Vec<bool> =
-            detect_each(&cases, &Search::default(), || ()).iter().map(|answers| any_kept(answers)).collect();
+        let kept: Vec<bool> = detect_each(&cases, &PairSearch::default(), || ())
+            .iter()
+            .map(|answers| any_kept(answers))
+            .collect();
         self.queries += pairs.len();
         self.query_files += 1;
         for ((pair, kept), query) in pairs.into_iter().zip(kept).zip(rows.chunks_exact(8)) {
@@ -255,7 +260,7 @@ impl Public {
 }
 
 /// Whether a pair of objects may collide.
-fn any_kept(answers: &[Answer]) -> bool {
+fn any_kept(answers: &[PairAnswer]) -> bool {
     answers.iter().any(|answer| answer.verdict.may_collide())
 }
 

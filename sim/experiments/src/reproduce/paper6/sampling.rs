@@ -2,7 +2,7 @@
 
 use std::ops::RangeInclusive;
 
-use output::plot::{Mark, Paint, Series};
+use output::plot::{Paint, PlotMark, Series};
 use pipeline::{Gpu, PipelineSpec};
 use rayon::prelude::*;
 use run::{GpuSpec, RunError};
@@ -12,12 +12,12 @@ use workloads::points::poisson::{
 };
 use workloads::points::quality::{ChiSquare, chi_square, closer_than, free_share, largest_hole, upper_tail};
 use workloads::points::white::{
-    Density, Named, Numbers, WhiteSpec, columns_for, counts, shares, white_noise,
+    Density, NamedDensity, Numbers, WhiteSpec, columns_for, counts, shares, white_noise,
 };
 use workloads::points::{NoiseSpec, draw_noise};
 
 use super::super::report::{dots, line};
-use super::super::row::{self, Cases, Row, Verdict, numbers};
+use super::super::row::{self, Cases, ClaimRow, Verdict, numbers};
 use super::super::{Done, Figure};
 use super::Task;
 use super::figures::balls_and_uncovered;
@@ -147,14 +147,14 @@ pub(super) fn darts(task: &Task<'_>) -> Result<Done, RunError> {
         ],
         ["x", "y"],
         vec![
-            Series::new("uncovered regions that the last pass draws", Mark::Faint(uncovered))
+            Series::new("uncovered regions that the last pass draws", PlotMark::Faint(uncovered))
                 .painted(Paint::Grey),
             dots("points", shown.map(|[x, y]| (*x, *y)).collect()),
         ],
     );
     let made = with.row(&row.about, (ours, Verdict::of(holds), note));
     let in_cube = balls_and_uncovered(&deep.darts, *row.radius_3d.get(form))?;
-    Ok(Done { row: Row { numbers: facts, ran, ..made }, figures: vec![figure, in_cube] })
+    Ok(Done { row: ClaimRow { numbers: facts, ran, ..made }, figures: vec![figure, in_cube] })
 }
 
 /// The outline of an uncovered region in the plane.
@@ -182,11 +182,11 @@ impl Tested {
         [sets, points, cells]: [u64; 3],
         hardware: &PipelineSpec,
     ) -> Result<Self, RunError> {
-        let expected = shares::<D>(&Named::Gauss, cells, 8);
+        let expected = shares::<D>(&NamedDensity::Gauss, cells, 8);
         let one = |seed| {
             let spec = NoiseSpec { count: points as f64, seed, across: columns_for(D) };
             let mut gpu = Gpu::without_packets(hardware).map_err(failed)?;
-            let found = draw_noise::<D>(&Named::Gauss, &spec, &mut gpu).map_err(failed)?;
+            let found = draw_noise::<D>(&NamedDensity::Gauss, &spec, &mut gpu).map_err(failed)?;
             Ok::<Self, RunError>(Self {
                 sets: vec![chi_square(&counts(&found.points, cells), &expected)],
                 ran: Ran { fragments: found.fragments, ..Ran::of(&gpu.finish()) },
@@ -205,7 +205,7 @@ impl Tested {
 
     /// The same on the CPU, of so many points each.
     fn on_cpu<const D: usize>([sets, points, cells]: [u64; 3], numbers: Numbers) -> Result<Self, RunError> {
-        let density: &dyn Density<D> = &Named::Gauss;
+        let density: &dyn Density<D> = &NamedDensity::Gauss;
         let expected = shares(density, cells, 8);
         let one = |seed| {
             let spec = WhiteSpec { count: points as usize, seed, across: columns_for(D), numbers };
@@ -312,13 +312,13 @@ pub(super) fn densities(task: &Task<'_>) -> Result<Done, RunError> {
         ("points", sum(|tested| tested.points)),
         ("candidates", sum(|tested| tested.candidates)),
     ]));
-    Ok(Done { row: Row { numbers: facts, ran, note, ..made }, figures: vec![histogram(points)?] })
+    Ok(Done { row: ClaimRow { numbers: facts, ran, note, ..made }, figures: vec![histogram(points)?] })
 }
 
 /// Figure 12: points on a line against the density.
 fn histogram(count: usize) -> Result<Figure, RunError> {
     const BINS: u64 = 100;
-    let density: &dyn Density<1> = &Named::Gauss;
+    let density: &dyn Density<1> = &NamedDensity::Gauss;
     let spec = WhiteSpec { count, seed: 1, across: 64, numbers: Numbers::Independent };
     let points = white_noise(density, &spec).map_err(failed)?.points;
     let shares = shares(density, BINS, 16);

@@ -1,10 +1,10 @@
 //! Settings of Paper VI's rows.
 
 use serde::{Deserialize, Serialize};
-use workloads::collision::Method;
+use workloads::collision::CollisionMethod;
 
 use super::super::Paper;
-use super::super::settings::{About, Form, Setting, paper_settings, row_settings};
+use super::super::settings::{About, Form, RowSetting, paper_settings, row_settings};
 
 /// Width and height of an image in pixels.
 pub(super) type Size = (u32, u32);
@@ -33,7 +33,7 @@ paper_settings!(Paper::Six, "paper6.ron" {
 row_settings! {
     /// VI-1.
     Missed {
-        methods: Vec<Method>, must(|methods| !methods.is_empty(), "a list of one or more");
+        methods: Vec<CollisionMethod>, must(|methods| !methods.is_empty(), "a list of one or more");
         resolution_px: u32, within(1..=1024);
         cases_of_each_family: usize, within(1..=1000);
         seed: u64, within(0..=u64::MAX);
@@ -42,7 +42,7 @@ row_settings! {
 
     /// VI-2; `cases` are names of those in `objects`.
     Dodged {
-        methods: Vec<Method>, must(|methods| !methods.is_empty(), "a list of one or more");
+        methods: Vec<CollisionMethod>, must(|methods| !methods.is_empty(), "a list of one or more");
         resolution_px: u32, within(1..=1024);
         objects: Vec<TwoObjects>, must(
             |objects| objects.iter().all(TwoObjects::is_possible),

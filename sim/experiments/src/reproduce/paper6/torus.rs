@@ -5,10 +5,10 @@ use pipeline::Lane;
 use pipeline::sampling::{HashedSamples, LensShape};
 use run::{GpuSpec, RunError};
 use workloads::points::quality::upper_tail;
-use workloads::points::volume::{Blurred, Covered, Point, Torus, every_sample, standard_mode};
+use workloads::points::volume::{Blurred, CoveredSamples, SamplePoint, Torus, every_sample, standard_mode};
 
 use super::super::report::dots;
-use super::super::row::{self, Cases, Number, Row, numbers};
+use super::super::row::{self, Cases, ClaimRow, RowNumber, numbers};
 use super::super::{Done, Figure};
 use super::Task;
 use crate::study::Ran;
@@ -19,7 +19,7 @@ fn failed(error: impl std::fmt::Display) -> RunError {
 
 /// Samples found in a torus, and how many standard errors count and integral are off.
 struct Filled {
-    found: Covered,
+    found: CoveredSamples,
     inside: f64,
     expected: f64,
     integral: f64,
@@ -29,12 +29,12 @@ struct Filled {
     differing: usize,
 }
 
-fn from_axis([x, y, ..]: &Point) -> f64 {
+fn from_axis([x, y, ..]: &SamplePoint) -> f64 {
     (x - 0.5).powi(2) + (y - 0.5).powi(2)
 }
 
 /// How many points are in one list alone, or in another place. Both are in the order of pixels.
-fn differing(a: &[Point], b: &[Point]) -> usize {
+fn differing(a: &[SamplePoint], b: &[SamplePoint]) -> usize {
     a.len().abs_diff(b.len()) + a.iter().zip(b).filter(|(a, b)| a != b).count()
 }
 
@@ -184,7 +184,7 @@ impl Scatter {
         )
     }
 
-    fn facts(&self) -> Vec<Number> {
+    fn facts(&self) -> Vec<RowNumber> {
         numbers([
             ("deviations", self.0.len() as f64),
             ("scatter_in_standard_errors", self.rms()),
@@ -236,14 +236,14 @@ pub(super) fn row(task: &Task<'_>) -> Result<Done, RunError> {
         disks[0].text(),
         disks[1].text()
     );
-    let mut numbers: Vec<Number> = facts(first).into_iter().chain(scatter.facts()).collect();
+    let mut numbers: Vec<RowNumber> = facts(first).into_iter().chain(scatter.facts()).collect();
     numbers.extend(self::numbers([
         ("deviation_of_count_4d", disks[0].count_off),
         ("deviation_of_count_5d", disks[1].count_off),
         ("differing_from_cpu", differing as f64),
     ]));
     let ran = ran(&filled, &disks);
-    Ok(Done { row: Row { numbers, note, ran, ..made }, figures: vec![slice(&first.found)] })
+    Ok(Done { row: ClaimRow { numbers, note, ran, ..made }, figures: vec![slice(&first.found)] })
 }
 
 fn ours(first: &Filled, torus: &Torus) -> String {
@@ -260,7 +260,7 @@ fn ours(first: &Filled, torus: &Torus) -> String {
     )
 }
 
-fn facts(first: &Filled) -> Vec<Number> {
+fn facts(first: &Filled) -> Vec<RowNumber> {
     numbers([
         ("inside", first.inside),
         ("expected", first.expected),
@@ -270,7 +270,7 @@ fn facts(first: &Filled) -> Vec<Number> {
     ])
 }
 
-fn ran(filled: &[Filled], disks: &[Disk]) -> Vec<Number> {
+fn ran(filled: &[Filled], disks: &[Disk]) -> Vec<RowNumber> {
     let mut ran = row::ran(&filled.iter().map(|one| one.ran).chain(disks.iter().map(|disk| disk.ran)).sum());
     ran.extend(numbers([
         ("samples", filled.iter().map(|one| one.found.samples as f64).sum()),
@@ -281,7 +281,7 @@ fn ran(filled: &[Filled], disks: &[Disk]) -> Vec<Number> {
 }
 
 /// Figure 9: the samples near a plane through the axis.
-fn slice(found: &Covered) -> Figure {
+fn slice(found: &CoveredSamples) -> Figure {
     let near = found.points.iter().filter(|[_, y, ..]| (y - 0.5).abs() < 0.01);
     Figure::plane(
         "VI_fig9",
@@ -343,8 +343,8 @@ mod tests {
         let honest: Vec<Filled> = seeds.map(|seed| Filled::new(&torus, seed, [128, 4]).unwrap()).collect();
         let repeated = |one: &Filled| {
             let kept = one.found.points.iter().step_by(4);
-            let points: Vec<Point> = kept.flat_map(|point| [*point; 4]).collect();
-            Filled { found: Covered { points, ..one.found.clone() }, ..*one }
+            let points: Vec<SamplePoint> = kept.flat_map(|point| [*point; 4]).collect();
+            Filled { found: CoveredSamples { points, ..one.found.clone() }, ..*one }
         };
         let scatter =
             |filled: &[Filled]| Scatter(filled.iter().flat_map(|one| one.by_octant(&torus)).collect());

@@ -8,9 +8,9 @@ use workloads::multiview::Layout;
 use super::Task;
 use super::figures::{self, Line};
 use super::settings::{Policy, Size, Views};
-use crate::chart::multiview::{Bench, Lanes};
+use crate::chart::multiview::{MultiviewBench, ViewLanes};
 use crate::reproduce::report::{level, line, over_doublings};
-use crate::reproduce::row::{Cases, Row, With, numbers, one_at_a_time, ran};
+use crate::reproduce::row::{Cases, ClaimRow, With, numbers, one_at_a_time, ran};
 use crate::reproduce::settings::Form;
 use crate::reproduce::{Done, Figure};
 use crate::study::{Ran, StudyError};
@@ -97,7 +97,7 @@ impl Point {
     }
 
     /// Lanes of all views and of one.
-    fn lanes(&self, shape: [u32; 2]) -> Result<Lanes, StudyError> {
+    fn lanes(&self, shape: [u32; 2]) -> Result<ViewLanes, StudyError> {
         let layout = self.layout(shape);
         let replacement = match self.policy {
             Policy::Lru => Replacement::Lru,
@@ -105,7 +105,8 @@ impl Point {
         };
         let cache = CacheSpec { replacement, ..CacheSpec::lru(self.quads, self.ways) };
         let size = [self.size_px.0, self.size_px.1];
-        let bench = Bench::with_shutter((self.scene.0.as_str(), self.scene.1), size, Some(self.shutter))?;
+        let bench =
+            MultiviewBench::with_shutter((self.scene.0.as_str(), self.scene.1), size, Some(self.shutter))?;
         bench.lanes(layout, cache, self.samples)
     }
 }
@@ -260,7 +261,7 @@ fn done(with: &With<'_, Views>, figures: [&'static str; 3]) -> Result<Done, RunE
     let images = base.images(figures[2], shape(row, form))?;
     let figures =
         vec![over_entries(figures[0], row, &entries), banded(figures[1], row, form, &curves), images];
-    let judged = Row { numbers: facts, ran, ..with.banded(&row.about, text, band) };
+    let judged = ClaimRow { numbers: facts, ran, ..with.banded(&row.about, text, band) };
     Ok(Done { row: judged.limited(&cache_sizes(row, form, &entries)), figures })
 }
 

@@ -1,14 +1,14 @@
 //! What each step of the finder is worth: all of it, and with one step left out, on the eight scenes and on
 //! the devices of other structure.
 //!
-//! `ablation FIRST_SEED LAST_SEED`: mean F1 with the first mark, median energy error, and how many wrong and
-//! right frames carry a flag.
+//! `cargo bench -p traces --bench ablation -- FIRST_SEED LAST_SEED`: mean F1 with the first mark, median energy
+//! error, and how many wrong and right frames carry a flag.
 
 use std::error::Error;
 use traces::Trace;
 use traces::energy::{PowerIntegral, TOLERANCE_S, score, true_frames};
-use traces::frames::{Marks, Options, Step, default_window, find_with};
-use traces::synth::{HELD_OUT_DEVICES, RecorderSpec, SCENARIOS, Scene};
+use traces::frames::{FinderOptions, FinderStep, Marks, default_window, find_with};
+use traces::synth::{HELD_OUT_DEVICES, RecorderSpec, SCENARIOS, SynthScene};
 
 const FRAMES: usize = 200;
 /// The marked frame, as a share of all, and the error of the mark, s.
@@ -27,13 +27,15 @@ struct Sum {
 }
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let arguments: Vec<u64> = std::env::args().skip(1).map(|text| text.parse()).collect::<Result<_, _>>()?;
+    let arguments = std::env::args().skip(1).filter(|arg| arg != "--bench");
+    let arguments: Vec<u64> = arguments.map(|text| text.parse()).collect::<Result<_, _>>()?;
     let &[first, last] = arguments.as_slice() else {
         return Err("usage: ablation FIRST_SEED LAST_SEED".into());
     };
-    let steps = core::iter::once(("nothing", None)).chain(Step::ALL.map(|(name, step)| (name, Some(step))));
-    let options: Vec<(&str, Options)> =
-        steps.map(|(name, without)| (name, Options { without, ..Options::default() })).collect();
+    let steps =
+        core::iter::once(("nothing", None)).chain(FinderStep::ALL.map(|(name, step)| (name, Some(step))));
+    let options: Vec<(&str, FinderOptions)> =
+        steps.map(|(name, without)| (name, FinderOptions { without, ..FinderOptions::default() })).collect();
     println!("on: without: F1, energy error in percent, wrong frames with a flag, right frames with a flag");
     for name in
         SCENARIOS.map(|scenario| scenario.name).into_iter().chain(HELD_OUT_DEVICES.map(|kind| kind.name))
@@ -54,7 +56,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-fn recorded(name: &str, seed: u64) -> Result<(Scene, Trace), Box<dyn Error>> {
+fn recorded(name: &str, seed: u64) -> Result<(SynthScene, Trace), Box<dyn Error>> {
     let kind = HELD_OUT_DEVICES.iter().find(|kind| kind.name == name);
     let scenario = SCENARIOS.iter().find(|scenario| scenario.name == name);
     let (scene, recording) = match (kind, scenario) {
@@ -69,7 +71,12 @@ fn recorded(name: &str, seed: u64) -> Result<(Scene, Trace), Box<dyn Error>> {
 }
 
 impl Sum {
-    fn add(&mut self, scene: &Scene, trace: &Trace, options: &Options) -> Result<(), Box<dyn Error>> {
+    fn add(
+        &mut self,
+        scene: &SynthScene,
+        trace: &Trace,
+        options: &FinderOptions,
+    ) -> Result<(), Box<dyn Error>> {
         let truth_s: Vec<f64> = scene.truth.iter().map(|frame| frame.start_s).collect();
         let mark_s = truth_s[(MARKED * truth_s.len() as f64) as usize] + HAND_S;
         let marks = Marks::one(mark_s, default_window(0.0, trace.rate_hz()), trace.end_s());

@@ -2,15 +2,17 @@
 //! whether a map would make it one: fits a logistic map (Platt 1999) of confidence, of how far methods agree
 //! and of how even gaps are, on all kinds of devices but one, and judges it on that one.
 //!
-//! `calibrate_confidence FIRST_SEED LAST_SEED [METHOD|STEP]`: METHOD in place of `auto`, or `auto` without
-//! STEP, one of `traces::frames::Step`.
+//! `cargo bench -p traces --bench calibrate_confidence -- FIRST_SEED LAST_SEED [METHOD|STEP]`: METHOD in place
+//! of `auto`, or `auto` without STEP, one of `traces::frames::Step`.
 
 use std::error::Error;
 use std::process::ExitCode;
 use traces::Trace;
 use traces::energy::{TOLERANCE_S, pairs, true_frames};
-use traces::frames::{FinderMethod, Found, MarkError, Marks, Options, Step, default_window, find_with};
-use traces::synth::{HELD_OUT_DEVICES, Scene};
+use traces::frames::{
+    FinderMethod, FinderOptions, FinderStep, Found, MarkError, Marks, default_window, find_with,
+};
+use traces::synth::{HELD_OUT_DEVICES, SynthScene};
 
 /// Frames of each device.
 const FRAMES: usize = 200;
@@ -43,12 +45,12 @@ fn main() -> ExitCode {
 }
 
 fn run() -> Result<(), Box<dyn Error>> {
-    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let arguments: Vec<String> = std::env::args().skip(1).filter(|arg| arg != "--bench").collect();
     let [first, last, which @ ..] = arguments.as_slice() else {
         return Err("usage: calibrate_confidence FIRST_SEED LAST_SEED [METHOD|STEP]".into());
     };
-    let step = |name: &str| Step::ALL.into_iter().find(|step| step.0 == name).map(|step| step.1);
-    let mut options = Options::default();
+    let step = |name: &str| FinderStep::ALL.into_iter().find(|step| step.0 == name).map(|step| step.1);
+    let mut options = FinderOptions::default();
     if let Some(name) = which.first() {
         options.without = step(name);
         if options.without.is_none() {
@@ -112,9 +114,9 @@ fn report(cases: &[Case]) {
 /// F1 with each mark; adds the frames found.
 fn cases_of(
     kind: &'static str,
-    scene: &Scene,
+    scene: &SynthScene,
     trace: &Trace,
-    options: &Options,
+    options: &FinderOptions,
     cases: &mut Vec<Case>,
 ) -> Result<Vec<f64>, MarkError> {
     let truth_s: Vec<f64> = scene.truth.iter().map(|frame| frame.start_s).collect();
@@ -126,7 +128,7 @@ fn cases_of(
         let mark_s = truth_s[(share * truth_s.len() as f64) as usize] + hand_s;
         let marks = Marks::one(mark_s, default_window(0.0, trace.rate_hz()), trace.end_s());
         let found = find_with(trace, &marks, options)?;
-        let by = |method| find_with(trace, &marks, &Options { method, ..*options });
+        let by = |method| find_with(trace, &marks, &FinderOptions { method, ..*options });
         let [squares, normalized] = [by(FinderMethod::SumOfSquares)?, by(FinderMethod::Normalized)?]
             .map(|other| agreement(&found, &other));
         let found_s = times_s(&found);
