@@ -95,7 +95,7 @@ impl Arbiter {
         Self { calendar, slots, lags: Default::default(), room }
     }
 
-    /// How long the client of a port could not go on since it was asked last.
+    /// How long the client of a port could not go on since the last call.
     pub fn stalled(&mut self, port: usize) -> Time {
         self.calendar.time_of(std::mem::take(&mut self.lags[port].stalled))
     }

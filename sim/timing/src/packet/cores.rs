@@ -1,4 +1,7 @@
 //! Shader cores and data units of the level `packet`.
+//!
+//! Vertices end by the calendar of all lanes and the slots as they see them. Pixels and groups end when their core
+//! has served them in turn ([`Residents`]), and no earlier than by the calendar. Both kinds are in both.
 
 use super::calendar::{Calendar, QueueTimes};
 use super::memory::Memory;
@@ -34,8 +37,8 @@ pub(super) struct Run {
     pub taken: Time,
     /// When its last warp is done.
     pub done: Time,
-    /// When the packet leaves the cores.
-    pub departed: Time,
+    /// When a packet of vertices leaves the cores; `None` for others, which [`Cores::leave`] knows.
+    pub departed: Option<Time>,
     /// When its data unit works on it, from the first cycle to the last.
     pub data: Option<Service>,
     /// When its lines pass the L2 and memory.
@@ -64,10 +67,10 @@ struct Sender {
 
 /// Packets of vertices on the cores. They leave in order.
 #[derive(Clone, Debug)]
-struct Vertices {
+struct VertexQueue {
     departed: Time,
     flights: QueueTimes,
-    /// Warp slots of the cores. Each kind has its own, as the times of the two kinds are not sorted together.
+    /// Warp slots as warps of vertices see them, in the order of the stream.
     slots: Slots,
 }
 
@@ -105,14 +108,14 @@ impl DataState {
 #[derive(Clone, Debug)]
 pub(super) struct Cores {
     senders: [Sender; 2],
-    vertices: Vertices,
+    vertices: VertexQueue,
     residents: Residents,
     /// Warps sent, and the part of a cycle that one takes.
     sends: Calendar,
     send_work: Work,
     lanes: Calendar,
     /// How both kinds share the warp slots.
-    slots: Occupancy,
+    occupancy: Occupancy,
     /// Turns of pixels and groups at the slots, for vertices that wait beside them.
     turns: Turns,
     cores: u32,
@@ -132,12 +135,12 @@ impl Cores {
         let slots = Slots::new(spec.cores.get() * spec.warps.get());
         Self {
             senders: Default::default(),
-            vertices: Vertices { departed: 0, flights: QueueTimes::new(spec.in_flight.get()), slots },
-            residents: Residents::new(machine, clocks),
+            vertices: VertexQueue { departed: 0, flights: QueueTimes::new(spec.in_flight.get()), slots },
+            residents: Residents::new(spec, period),
             sends: Calendar::new(Time::from(SLOT_CYCLES) * period, spec.warps_per_cycle.get()),
             send_work: CYCLE.div_ceil(spec.warps_per_cycle.get().into()),
             lanes: Calendar::new(Time::from(SLOT_CYCLES) * period, spec.cores.get() * spec.lanes.get()),
-            slots: Occupancy::new(spec.cores.get() * spec.warps.get(), OPERATIONS_PER_INTERVAL * alu),
+            occupancy: Occupancy::new(spec.cores.get() * spec.warps.get(), OPERATIONS_PER_INTERVAL * alu),
             turns: Turns::default(),
             cores: spec.cores.get(),
             period,
@@ -156,7 +159,7 @@ impl Cores {
 
     /// When the last work that made room for other work ends.
     pub fn yielded(&self) -> Time {
-        self.lanes.yielded().max(self.slots.yielded())
+        self.lanes.yielded().max(self.occupancy.yielded())
     }
 
     /// When a packet of pixels or a group that comes at `arrive` is taken, and when there is room for it. `None`
@@ -197,7 +200,7 @@ impl Cores {
             room = taken.max(visit.room);
             self.residents.enter(demand, warps);
         }
-        let mut run = Run { taken, done: taken, departed: taken, data: None, memory: Span::NONE };
+        let mut run = Run { taken, done: taken, departed: None, data: None, memory: Span::NONE };
         let data_unit = (kind == 1 && demand.uses_data()).then(|| demand.data_unit());
         let mut first = 0;
         while first < warps {
@@ -216,7 +219,7 @@ impl Cores {
             match kind {
                 0 => {
                     self.vertices.slots.hold(chunk.count, done.from, done.to);
-                    self.residents.share(demand, warps, chunk.count, ready);
+                    self.residents.start_vertices(demand, warps, chunk.count, ready);
                 }
                 _ => self.residents.start(chunk.count, ready),
             }
@@ -228,9 +231,10 @@ impl Cores {
             return run;
         }
         let vertices = &mut self.vertices;
-        run.departed = aligned(run.done.max(vertices.departed).max(visit.room), self.period);
-        vertices.departed = run.departed;
-        vertices.flights.note(run.departed);
+        let departed = aligned(run.done.max(vertices.departed).max(visit.room), self.period);
+        vertices.departed = departed;
+        vertices.flights.note(departed);
+        run.departed = Some(departed);
         run
     }
 
@@ -254,9 +258,8 @@ impl Cores {
             Some(_) if chunk.first == 0 => self.turns.note(Wait { since, sent: sent.from, warps: chunk.of }),
             Some(_) => {}
             None => {
-                let step = (sent.to - sent.from) / Time::from(chunk.count.max(2) - 1);
-                let at = |warp: u32| sent.from + step * Time::from(warp);
-                (0..chunk.count).for_each(|warp| self.turns.note(Wait { since, sent: at(warp), warps: 1 }));
+                let sent = |warp| sent.spread(warp, chunk.count);
+                (0..chunk.count).for_each(|warp| self.turns.note(Wait { since, sent: sent(warp), warps: 1 }));
             }
         }
     }
@@ -347,7 +350,7 @@ impl Cores {
         // Warps of both kinds take turns on the slots. How long others keep the lanes does not count, as a
         // warp is faster with fewer beside it.
         let each = alone + ready.from.saturating_sub(sent);
-        let held = self.slots.hold(visit.turn, sent, chunk.count, each);
+        let held = self.occupancy.hold(visit.turn, sent, chunk.count, each);
         let last = (ready.to + alone).max(issued + self.alu.saturating_sub(self.period)).max(held);
         Span { from: last - (ready.to - ready.from).min(last - ready.from), to: last }
     }

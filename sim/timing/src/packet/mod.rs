@@ -34,7 +34,7 @@ mod cores;
 mod dram;
 mod memory;
 mod residents;
-mod sharing;
+mod shared_cores;
 mod slots;
 mod station;
 mod tally;
@@ -81,6 +81,11 @@ impl Span {
     fn with(self, from: Time, to: Time) -> Self {
         Self { from: self.from.min(from), to: self.to.max(to) }
     }
+
+    /// The time of part `at` of `count` that are spread evenly, the first at its begin and the last at its end.
+    fn spread(self, at: u32, count: u32) -> Time {
+        self.from + (self.to - self.from) / Time::from(count.max(2) - 1) * Time::from(at)
+    }
 }
 
 /// A packet of pixels or a group on the cores.
@@ -113,9 +118,10 @@ pub struct PacketClock {
     /// Whether the clocks of the stations differ.
     clocks_differ: bool,
     cores: Cores,
-    /// Packets of pixels and groups on the cores, and their lines.
+    /// Packets of pixels and groups on the cores, in the order in which they leave, and their lines of colour.
     on_cores: VecDeque<OnCores>,
     lines_on_cores: VecDeque<LineAccess>,
+    /// Scratch memory of [`Self::depart`].
     leaving: Vec<LineAccess>,
     memory: Memory,
     tally: Tally,
@@ -395,7 +401,7 @@ impl PacketClock {
         }
         self.done(&demand, begin, at);
         self.count_memory(&counts, memory);
-        self.tally.packet_left(&counts);
+        self.tally.packet_departed(&counts);
     }
 
     /// The cores run empty.
@@ -425,7 +431,7 @@ impl PacketClock {
         } else if visit.demand.group.is_some() {
             self.tally.count(unit, counts, run.taken, run.done);
         }
-        run.departed
+        run.departed.unwrap_or(run.done)
     }
 
     /// Activity of all packets added.
@@ -438,13 +444,13 @@ impl PacketClock {
         let Self { machine, tally, clocks, cores, memory, passes, draws, packets, .. } = self;
         let mut recorder = tally.finish();
         recorder.lasts(end_ps);
-        tally::write(&mut recorder, &clocks, Unit::Shader, cores.lanes(), 1, end_ps);
-        tally::write(&mut recorder, &clocks, Unit::L2, memory.l2(), 1, end_ps);
+        tally::write_calendar(&mut recorder, &clocks, Unit::Shader, cores.lanes(), 1, end_ps);
+        tally::write_calendar(&mut recorder, &clocks, Unit::L2, memory.l2(), 1, end_ps);
         for (unit, calendar) in memory.levels() {
-            tally::write(&mut recorder, &clocks, unit, calendar, 1, end_ps);
+            tally::write_calendar(&mut recorder, &clocks, unit, calendar, 1, end_ps);
         }
         for bus in memory.buses() {
-            tally::write(&mut recorder, &clocks, Unit::Dram, bus, channels, end_ps);
+            tally::write_calendar(&mut recorder, &clocks, Unit::Dram, bus, channels, end_ps);
         }
         let timeline = recorder.finish();
         let rows = crate::ratio_to_busiest(clocks.ps(memory.rows()), &timeline);

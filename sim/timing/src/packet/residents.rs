@@ -4,10 +4,10 @@
 use std::collections::VecDeque;
 
 use super::Span;
-use super::sharing::{Place, Sharing, Warps};
-use crate::clock::{Clocks, Time};
+use super::shared_cores::{Place, SharedCores, Warps};
+use crate::clock::Time;
 use crate::demand::ServiceDemand;
-use crate::spec::MachineSpec;
+use crate::spec::ShaderSpec;
 
 /// A packet on the cores.
 #[derive(Clone, Copy, Debug)]
@@ -44,13 +44,13 @@ pub(super) struct Residents {
     group: Option<Place>,
     sending: Vec<Place>,
     /// Warps of vertices that have not begun, by time.
-    vertices: VecDeque<Vertices>,
-    cores: Sharing,
+    vertices: VecDeque<WaitingVertices>,
+    cores: SharedCores,
 }
 
 /// Warps of vertices, which take slots and lanes, too.
 #[derive(Clone, Copy, Debug)]
-struct Vertices {
+struct WaitingVertices {
     from: f64,
     warps: Warps,
 }
@@ -59,8 +59,8 @@ struct Vertices {
 const MAX_AHEAD: usize = 1 << 12;
 
 impl Residents {
-    pub fn new(machine: &MachineSpec, clocks: &Clocks) -> Self {
-        let spec = &machine.shader;
+    /// Cores of `spec`, with cycles of `period`.
+    pub fn new(spec: &ShaderSpec, period: Time) -> Self {
         Self {
             packets: VecDeque::new(),
             departures: 0,
@@ -69,7 +69,7 @@ impl Residents {
             group: None,
             sending: Vec::new(),
             vertices: VecDeque::new(),
-            cores: Sharing::new(spec, clocks.period(spec.clock)),
+            cores: SharedCores::new(spec, period),
         }
     }
 
@@ -96,7 +96,7 @@ impl Residents {
     /// last are free. A group has the slots of all its warps at once.
     pub fn send(&mut self, count: u32, from: Time) -> (u32, Span) {
         self.sent = self.sent.max(from as f64);
-        while self.begin_vertices(self.sent.min(self.cores.next())) {}
+        while self.begin_vertices(self.sent.min(self.cores.next_end())) {}
         let at = |place: &Place| (place.at.round() as Time).max(from);
         if let Some(group) = self.packets.back().filter(|last| last.is_group) {
             let warps = group.warps;
@@ -120,7 +120,8 @@ impl Residents {
         let slots = self.cores.slots_for(count);
         loop {
             let place = self.cores.place(slots, from);
-            if place.is_some_and(|place| place.at <= self.cores.next()) || !self.end_first(f64::INFINITY) {
+            if place.is_some_and(|place| place.at <= self.cores.next_end()) || !self.end_first(f64::INFINITY)
+            {
                 return place.inspect(|&place| self.cores.take(place, slots));
             }
         }
@@ -130,17 +131,16 @@ impl Residents {
     pub fn start(&mut self, count: u32, ready: Span) {
         let Some(&Resident { is_group, steps, lanes, .. }) = self.packets.back() else { return };
         let packet = self.departures + self.packets.len() - 1;
-        let step = (ready.to - ready.from) / Time::from(count.max(2) - 1);
         let places = std::mem::take(&mut self.sending);
         let each = if is_group { count } else { 1 };
-        for (&place, behind) in places.iter().zip((0..places.len() as Time).rev()) {
-            let begin = (ready.to - step * behind) as f64;
+        for (&place, warp) in places.iter().zip(0..) {
+            let begin = if is_group { ready.to } else { ready.spread(warp, count) } as f64;
             while self.end_next(begin) {}
             if lanes > 0.0 {
                 self.cores.start(place, begin, &Warps { packet: Some(packet), count: each, steps, lanes });
             } else {
                 let end = begin + self.cores.latency();
-                self.cores.end(place, end, each);
+                self.cores.release(place, end, each);
                 self.ended(packet, each, end);
             }
         }
@@ -149,18 +149,20 @@ impl Residents {
     }
 
     /// `count` warps of a packet of `warps` warps of vertices begin, the first and the last at `ready`.
-    pub fn share(&mut self, demand: &ServiceDemand, warps: u32, count: u32, ready: Span) {
+    pub fn start_vertices(&mut self, demand: &ServiceDemand, warps: u32, count: u32, ready: Span) {
         let Resident { steps, lanes, .. } = Resident::new(demand, warps);
-        for warp in 0..Time::from(count) {
-            let from = (ready.from + (ready.to - ready.from) * warp / Time::from(count)) as f64;
-            self.vertices.push_back(Vertices { from, warps: Warps { packet: None, count: 1, steps, lanes } });
+        let warps = Warps { packet: None, count: 1, steps, lanes };
+        for warp in 0..count {
+            self.vertices.push_back(WaitingVertices { from: ready.spread(warp, count) as f64, warps });
         }
         while self.vertices.len() > MAX_AHEAD && self.end_next(f64::INFINITY) {}
     }
 
-    /// Begin with the next warp of vertices if it comes no later than `to`, when or before which no warp ends.
+    /// Begin the next warp of vertices that waits, if it is ready by `to`. No warp may end before `to`. A warp
+    /// that finds no slot is left out; then warps that have not begun hold all slots.
     fn begin_vertices(&mut self, to: f64) -> bool {
-        let Some(Vertices { from, warps }) = self.vertices.front().copied().filter(|first| first.from <= to)
+        let Some(WaitingVertices { from, warps }) =
+            self.vertices.front().copied().filter(|first| first.from <= to)
         else {
             return false;
         };
@@ -194,7 +196,7 @@ impl Residents {
 
     /// Serve until warps begin or end. Returns whether some do no later than `to`.
     fn end_next(&mut self, to: f64) -> bool {
-        self.begin_vertices(to.min(self.cores.next())) || self.end_first(to)
+        self.begin_vertices(to.min(self.cores.next_end())) || self.end_first(to)
     }
 
     /// Serve until warps end, if no more begin. Returns whether some end no later than `to`.
@@ -211,5 +213,90 @@ impl Residents {
         let packet = &mut self.packets[number - self.departures];
         packet.remaining -= warps;
         packet.done = packet.done.max(at);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::demand::{CLIENTS, GroupDemand, Station};
+    use crate::spec::DATA_EVENTS;
+
+    /// One core with four lanes and four slots, for three packets. An operation takes two cycles or more.
+    fn residents() -> Residents {
+        let spec = "(latency_cycles: 1, queue: 8, in_flight: 3, cores: 1, lanes: 4, warp_lanes: 4, warps: 4, \
+                    alu_latency_cycles: 2, shared_bytes: 1024)";
+        Residents::new(&activity::spec::parse(spec, "test").unwrap(), 1)
+    }
+
+    fn demand(threads: u32, ops: u32, group: Option<GroupDemand>) -> ServiceDemand {
+        ServiceDemand {
+            front: false,
+            pass: 0,
+            draw: 0,
+            batch: 0,
+            barrier: None,
+            last: Station::Pixel,
+            service: [0; Station::COUNT],
+            threads,
+            ops,
+            data: [0; DATA_EVENTS],
+            group,
+            first_line: 0,
+            lines: [0; CLIENTS.len()],
+        }
+    }
+
+    /// Send all warps from `from` on; they begin at once.
+    fn add(residents: &mut Residents, demand: &ServiceDemand, from: Time) -> Vec<Span> {
+        let warps = demand.warps(4);
+        residents.enter(demand, warps);
+        let (mut sent, mut spans) = (0, Vec::new());
+        while sent < warps {
+            let (count, span) = residents.send(warps - sent, from);
+            residents.start(count, span);
+            sent += count;
+            spans.push(span);
+        }
+        spans
+    }
+
+    #[test]
+    fn packets_leave_in_order_and_make_room() {
+        let mut residents = residents();
+        assert_eq!(residents.room(usize::MAX), Some(0));
+        // The first takes longest, and both others wait for it. One without operations takes a step.
+        for ops in [10, 1, 0] {
+            add(&mut residents, &demand(4, ops, None), 0);
+        }
+        assert_eq!((residents.room(usize::MAX), residents.oldest_is_done()), (None, false));
+        assert_eq!(residents.leave(0), 20);
+        assert!(residents.oldest_is_done());
+        assert_eq!(residents.leave(33), 33);
+        assert_eq!(residents.leave(0), 33);
+        assert_eq!((residents.room(usize::MAX), residents.room(1)), (Some(20), Some(33)));
+    }
+
+    #[test]
+    fn a_group_waits_for_the_slots_of_all_its_warps() {
+        let mut residents = residents();
+        add(&mut residents, &demand(12, 10, None), 0);
+        let group = GroupDemand { steps: 5, shared_bytes: 0 };
+        // Three full warps take three cycles per operation. One slot is free, and the group needs two.
+        let spans = add(&mut residents, &demand(8, 5, Some(group)), 4);
+        assert_eq!((spans[0].from, spans[0].to), (30, 30));
+        assert_eq!([residents.leave(0), residents.leave(0)], [30, 40]);
+    }
+
+    #[test]
+    fn vertices_take_lanes_from_pixels_once_these_have_come_as_far() {
+        let mut residents = residents();
+        let vertices = demand(12, 10, None);
+        residents.start_vertices(&vertices, 3, 3, Span { from: 100, to: 100 });
+        add(&mut residents, &demand(4, 10, None), 0);
+        assert_eq!(residents.leave(0), 20);
+        // Four full warps from 100 on.
+        add(&mut residents, &demand(4, 10, None), 100);
+        assert_eq!(residents.leave(0), 140);
     }
 }

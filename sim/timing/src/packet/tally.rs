@@ -14,7 +14,7 @@ const BEHIND_CORES: [Unit; 5] = [Unit::Colour, Unit::L2, Unit::Llc, Unit::Edram,
 
 /// Write the busy time of one of `servers` servers of a unit from its calendar, bin by bin. Slots may end
 /// after the frame; their work is moved before its end.
-pub(super) fn write(
+pub(super) fn write_calendar(
     recorder: &mut Recorder,
     clocks: &Clocks,
     unit: Unit,
@@ -114,20 +114,21 @@ impl Tally {
         self.total += counts;
     }
 
-    /// Record that all units but those behind the cores have done their part.
+    /// Record that the units up to the cores have done their part of `counts`.
     pub fn packet_passed(&mut self, counts: &PacketCounts) {
         self.total += counts;
-        for unit in BEHIND_CORES {
-            let total = self.total.of_mut(unit).iter_mut().zip(counts.of(unit));
-            total.for_each(|(total, &count)| *total -= u64::from(count));
-        }
+        self.change_behind_cores(counts, |total, count| *total -= count);
     }
 
-    /// Record that those have, too.
-    pub fn packet_left(&mut self, counts: &PacketCounts) {
+    /// Record that the units behind the cores have done their part of `counts`.
+    pub fn packet_departed(&mut self, counts: &PacketCounts) {
+        self.change_behind_cores(counts, |total, count| *total += count);
+    }
+
+    fn change_behind_cores(&mut self, counts: &PacketCounts, change: impl Fn(&mut u64, u64)) {
         for unit in BEHIND_CORES {
-            let total = self.total.of_mut(unit).iter_mut().zip(counts.of(unit));
-            total.for_each(|(total, &count)| *total += u64::from(count));
+            let totals = self.total.of_mut(unit).iter_mut().zip(counts.of(unit));
+            totals.for_each(|(total, &count)| change(total, count.into()));
         }
     }
 

@@ -321,9 +321,9 @@ fn short_programs_pass_a_long_one_on_the_other_slot() {
     assert!(found.abs_diff(truth) <= 2, "{found} of {truth}");
 }
 
-/// Programs of one operation and of two thousand on a few cores. What waits behind the long ones in order keeps
-/// others from coming, and a core with more of them than another takes longer. Which core that is hangs on
-/// single cycles, so `packet` is exact for one core, and where each long program has a slot.
+/// Programs of one operation and of two thousand on a few cores. A long one blocks the packets behind it, and a
+/// core with more of them than another takes longer. Which core that is depends on single cycles, so `packet` is
+/// exact for one core only, and where each long program has a slot.
 #[test]
 fn uneven_programs_on_few_cores() {
     for (cores, most) in [(1, 0.005), (2, 0.06), (3, 0.06), (4, 0.005), (6, 0.005)] {

@@ -7,8 +7,8 @@ use std::collections::{BinaryHeap, VecDeque};
 use crate::clock::Time;
 use crate::spec::ShaderSpec;
 
-/// Parts of a step and of a lane.
-const PARTS: f64 = 1024.0;
+/// Parts of a step and of a lane, in which sums are exact.
+const SCALE: f64 = 1024.0;
 
 /// Warps of a packet that run together.
 #[derive(Clone, Copy, Debug)]
@@ -38,15 +38,15 @@ pub(super) struct Place {
 
 /// All cores. A warp stays on its core.
 #[derive(Clone, Debug)]
-pub(super) struct Sharing {
+pub(super) struct SharedCores {
     cores: Vec<Core>,
     speed: Speed,
     slots: u32,
     /// Free slots of each core, and when its next one becomes free; infinite if that is not known.
     free: Vec<u32>,
-    frees: Vec<f64>,
+    next_free: Vec<f64>,
     /// When the next warps end on each core, and the core where they end first.
-    next: Vec<f64>,
+    next_end: Vec<f64>,
     first: usize,
 }
 
@@ -55,28 +55,47 @@ struct Speed {
     period: f64,
     alu: f64,
     lanes: f64,
+    /// Time of a part of a lane in a step.
+    of_part: f64,
+    /// Whether a warp may take several cycles per operation.
+    is_narrow: bool,
 }
 
-/// Active warps by the steps at which they end, in parts: the number of their packet, how many there are, and
-/// the parts of a lane of all.
-type Active = Reverse<(u64, Option<usize>, u32, u64)>;
+/// Warps that run, by the steps at which they end.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+struct Active {
+    /// In parts of a step.
+    ends: u64,
+    packet: Option<usize>,
+    count: u32,
+    /// Parts of a lane of all in a step.
+    lanes: u64,
+}
 
 #[derive(Clone, Debug)]
 struct Core {
     now: f64,
-    /// Steps so far of a warp that was there from the beginning.
+    /// Steps so far of a warp that was there from the beginning, and the time of one.
     steps: f64,
+    step: f64,
     /// Parts of a lane in a step of all active warps.
     lanes: u64,
-    active: BinaryHeap<Active>,
+    active: BinaryHeap<Reverse<Active>>,
     /// Slots that become free later, by time.
     later: VecDeque<(f64, u32)>,
 }
 
-impl Sharing {
+impl SharedCores {
     pub fn new(spec: &ShaderSpec, period: Time) -> Self {
         let slots = spec.warps.get();
-        let core = Core { now: 0.0, steps: 0.0, lanes: 0, active: BinaryHeap::new(), later: VecDeque::new() };
+        let core = Core {
+            now: 0.0,
+            steps: 0.0,
+            step: 0.0,
+            lanes: 0,
+            active: BinaryHeap::new(),
+            later: VecDeque::new(),
+        };
         let cores = spec.cores.get() as usize;
         Self {
             cores: vec![core; cores],
@@ -84,11 +103,13 @@ impl Sharing {
                 period: period as f64,
                 alu: (period * Time::from(spec.alu_latency_cycles)) as f64,
                 lanes: spec.lanes.get().into(),
+                of_part: period as f64 / f64::from(spec.lanes.get()) / SCALE,
+                is_narrow: spec.warp_lanes.get() > spec.lanes.get(),
             },
             slots,
             free: vec![slots; cores],
-            frees: vec![f64::INFINITY; cores],
-            next: vec![f64::INFINITY; cores],
+            next_free: vec![f64::INFINITY; cores],
+            next_end: vec![f64::INFINITY; cores],
             first: 0,
         }
     }
@@ -103,8 +124,8 @@ impl Sharing {
     pub fn place(&mut self, count: u32, from: f64) -> Option<Place> {
         let (mut most, mut core) = (0, 0);
         for at in 0..self.cores.len() {
-            if self.frees[at] <= from {
-                self.pass(at, from);
+            if self.next_free[at] <= from {
+                self.release_until(at, from);
             }
             if self.free[at] > most {
                 (most, core) = (self.free[at], at);
@@ -119,13 +140,13 @@ impl Sharing {
     }
 
     /// Slots of a core that are free by `at` are free.
-    fn pass(&mut self, core: usize, at: f64) {
+    fn release_until(&mut self, core: usize, at: f64) {
         let later = &mut self.cores[core].later;
         while let Some(&(_, count)) = later.front().filter(|(free, _)| *free <= at) {
             self.free[core] += count;
             later.pop_front();
         }
-        self.frees[core] = later.front().map_or(f64::INFINITY, |(free, _)| *free);
+        self.next_free[core] = later.front().map_or(f64::INFINITY, |(free, _)| *free);
     }
 
     /// Slots that warps need which are sent together.
@@ -138,88 +159,83 @@ impl Sharing {
         let now = count.min(self.free[place.core]);
         self.free[place.core] -= now;
         self.cores[place.core].take(count - now);
-        self.pass(place.core, 0.0);
+        self.release_until(place.core, 0.0);
     }
 
     /// Warps at a place begin at `at`, no earlier than others before.
     pub fn start(&mut self, place: Place, at: f64, warps: &Warps) {
         let core = &mut self.cores[place.core];
-        core.advance(at, &self.speed);
-        let lanes = ((warps.lanes * f64::from(warps.count)) * PARTS).round() as u64;
-        let ends = ((core.steps + f64::from(warps.steps)) * PARTS).round() as u64;
+        core.advance(at);
+        let lanes = ((warps.lanes * f64::from(warps.count)) * SCALE).round() as u64;
+        let ends = ((core.steps + f64::from(warps.steps)) * SCALE).round() as u64;
         core.lanes += lanes;
-        core.active.push(Reverse((ends, warps.packet, warps.count, lanes)));
-        let next = core.next(&self.speed);
+        let Warps { packet, count, .. } = *warps;
+        core.active.push(Reverse(Active { ends, packet, count, lanes }));
+        let next = core.next_end(&self.speed);
         self.ends_at(place.core, next);
     }
 
     /// The next warps of a core end at `next`.
     fn ends_at(&mut self, core: usize, next: f64) {
-        self.next[core] = next;
+        self.next_end[core] = next;
         if core == self.first {
-            let first = |best: usize, at: usize| if self.next[at] < self.next[best] { at } else { best };
-            self.first = (1..self.next.len()).fold(0, first);
-        } else if next < self.next[self.first] {
+            let first =
+                |best: usize, at: usize| if self.next_end[at] < self.next_end[best] { at } else { best };
+            self.first = (1..self.next_end.len()).fold(0, first);
+        } else if next < self.next_end[self.first] {
             self.first = core;
         }
     }
 
-    /// Warps at a place end without a step.
-    pub fn end(&mut self, place: Place, at: f64, count: u32) {
-        self.give(place.core, at, count);
-    }
-
-    /// Slots of a core are free from `at` on.
-    fn give(&mut self, core: usize, at: f64, count: u32) {
-        self.cores[core].give(at, count.min(self.slots));
-        self.frees[core] = self.frees[core].min(at);
+    /// `count` slots of the core of a place are free from `at` on.
+    pub fn release(&mut self, place: Place, at: f64, count: u32) {
+        self.cores[place.core].release(at, count.min(self.slots));
+        self.next_free[place.core] = self.next_free[place.core].min(at);
     }
 
     /// When the next warps end, if no more come; infinite if there are none.
-    pub fn next(&self) -> f64 {
-        self.next[self.first]
+    pub fn next_end(&self) -> f64 {
+        self.next_end[self.first]
     }
 
     /// The next warps that end no later than `to`.
     pub fn end_next(&mut self, to: f64) -> Option<Ended> {
         let at = self.first;
-        if self.next[at] > to {
+        if self.next_end[at] > to {
             return None;
         }
         let core = &mut self.cores[at];
-        let Reverse((ends, packet, count, lanes)) = core.active.pop()?;
-        (core.steps, core.now) = (core.steps.max(ends as f64 / PARTS), self.next[at]);
+        let Reverse(Active { ends, packet, count, lanes }) = core.active.pop()?;
+        (core.steps, core.now) = (core.steps.max(ends as f64 / SCALE), self.next_end[at]);
         core.lanes -= lanes;
-        let (now, next) = (core.now, core.next(&self.speed));
+        let (now, next) = (core.now, core.next_end(&self.speed));
         let ended = Ended { packet, count, at: now };
-        self.give(at, now, count);
+        self.release(Place { core: at, at: now }, now, count);
         self.ends_at(at, next);
         Some(ended)
     }
 }
 
 impl Core {
-    /// Time of a step of all warps, of which those that end first have `lanes` parts of a lane each.
-    fn step(&self, speed: &Speed) -> f64 {
-        let &Reverse((_, _, count, lanes)) = self.active.peek().unwrap_or(&Reverse((0, None, 1, 0)));
-        // A warp wider than a core takes several cycles per operation.
-        let of_warp = (lanes as f64 / PARTS / f64::from(count.max(1))).ceil();
-        let wide = ((of_warp / speed.lanes).ceil() - 1.0).max(0.0) * speed.period;
-        (self.lanes as f64 / PARTS * speed.period / speed.lanes).max(speed.alu + wide)
-    }
-
-    /// When the next warps end; infinite if there are none.
-    fn next(&self, speed: &Speed) -> f64 {
-        let ends = |&Reverse((ends, ..)): &Active| ends as f64 / PARTS;
-        let steps = self.active.peek().map(|first| (ends(first) - self.steps).max(0.0));
-        steps.map_or(f64::INFINITY, |steps| self.now + steps * self.step(speed))
+    /// Set the time of a step of all warps. Returns when those that end first do; infinite if there are none.
+    fn next_end(&mut self, speed: &Speed) -> f64 {
+        let Some(&Reverse(Active { ends, count, lanes, .. })) = self.active.peek() else {
+            return f64::INFINITY;
+        };
+        let mut least = speed.alu;
+        if speed.is_narrow {
+            let of_warp = (lanes as f64 / SCALE / f64::from(count.max(1))).ceil();
+            least += ((of_warp / speed.lanes).ceil() - 1.0).max(0.0) * speed.period;
+        }
+        self.step = least.max(self.lanes as f64 * speed.of_part);
+        self.now + (ends as f64 / SCALE - self.steps).max(0.0) * self.step
     }
 
     /// Serve until `to`, when or before which no warp ends.
-    fn advance(&mut self, to: f64, speed: &Speed) {
+    fn advance(&mut self, to: f64) {
         if to > self.now {
             if !self.active.is_empty() {
-                self.steps += (to - self.now) / self.step(speed);
+                self.steps += (to - self.now) / self.step;
             }
             self.now = to;
         }
@@ -245,7 +261,8 @@ impl Core {
         }
     }
 
-    fn give(&mut self, at: f64, count: u32) {
+    /// Slots become free at `at`.
+    fn release(&mut self, at: f64, count: u32) {
         let after = self.later.iter().rposition(|&(before, _)| before <= at).map_or(0, |last| last + 1);
         self.later.insert(after, (at, count));
     }
@@ -256,25 +273,25 @@ mod tests {
     use super::*;
 
     /// Cores of four lanes and two slots, with steps of at least two cycles.
-    fn cores(count: u32) -> Sharing {
+    fn cores(count: u32) -> SharedCores {
         let mut spec: ShaderSpec = activity::spec::parse(
-            "(latency_cycles: 1, queue: 8, in_flight: 8, cores: 1, lanes: 4, warp_lanes: 4, warps: 2, \
+            "(latency_cycles: 1, queue: 8, in_flight: 8, cores: 1, lanes: 4, warp_lanes: 8, warps: 2, \
              alu_latency_cycles: 2, shared_bytes: 1024)",
             "test",
         )
         .unwrap();
         spec.cores = activity::Bounded::new(count).unwrap();
-        Sharing::new(&spec, 1)
+        SharedCores::new(&spec, 1)
     }
 
-    fn start(cores: &mut Sharing, packet: usize, at: f64, steps: u32) -> usize {
+    fn start(cores: &mut SharedCores, packet: usize, at: f64, steps: u32) -> usize {
         let place = cores.place(1, at).unwrap();
         cores.take(place, 1);
         cores.start(place, at, &Warps { packet: Some(packet), count: 1, steps, lanes: 4.0 });
         place.core
     }
 
-    fn ends(cores: &mut Sharing) -> Vec<(Option<usize>, f64)> {
+    fn ends(cores: &mut SharedCores) -> Vec<(Option<usize>, f64)> {
         std::iter::from_fn(|| cores.end_next(f64::INFINITY)).map(|ended| (ended.packet, ended.at)).collect()
     }
 
@@ -303,6 +320,6 @@ mod tests {
         assert_eq!(cores.end_next(f64::INFINITY).map(|ended| ended.at), Some(10.0));
         assert_eq!(cores.place(1, 3.0).map(|place| (place.core, place.at)), Some((1, 10.0)));
         assert_eq!(start(&mut cores, 4, 12.0, 1), 1);
-        assert_eq!(cores.next(), 14.0);
+        assert_eq!(cores.next_end(), 14.0);
     }
 }
