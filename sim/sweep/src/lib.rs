@@ -1,7 +1,7 @@
 //! Design-space exploration: many runs from one file, on one machine or a cluster.
 //!
 //! ```text
-//! SweepSpec (axes) -> points -> SweepPlan (ids) -> Folder -> Work: execute -> a file per point -> merge -> results.parquet
+//! SweepSpec (axes) -> points -> SweepPlan (ids) -> Folder -> ShardWork: execute -> a file per point -> merge -> results.parquet
 //! ```
 //!
 //! - [`SweepSpec`]: the sweep file. [`SweepPlan`]: its points with ids, every value tried.
@@ -40,8 +40,8 @@ pub use merge::{RESULTS, merge};
 pub use plan::{Point, SweepPlan};
 pub use points::combinations;
 pub use report::{
-    Cost, Effect, Interaction, Measure, NearBest, NoEffect, Pair, PointFailure, RatedDesign, ReportOptions,
-    Share, SweepDesign, SweepReport, Winner,
+    Cost, Effect, Interaction, Measure, NearBest, NoEffect, Pair, RatedDesign, ReportOptions, Share,
+    SweepDesign, SweepReport, UnmeasuredPoint, Winner,
 };
 pub use setting::{Setting, Text, is_option, misspelt, with};
 pub use slurm::{Scripts, SlurmArray, SlurmJob, submit};
