@@ -12,6 +12,18 @@
 //! - [`Search`]: points that an optimizer requests.
 //!
 //! A point has no state but its file, so a sweep may be stopped at any moment and continued anywhere.
+//!
+//! ```
+//! use sweep::SweepPlan;
+//!
+//! let folder = tempfile::tempdir()?;
+//! let file = folder.path().join("two.ron");
+//! let axes = r#"[Values(path: "gpu.pipeline.tile_px", values: [4, 8])]"#;
+//! std::fs::write(&file, format!(r#"(name: "two", settings: {{"scene": "tiny"}}, axes: {axes})"#))?;
+//! let plan = SweepPlan::load(&file, false, None)?;
+//! assert_eq!(plan.points.len(), 2);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 mod ask;
 mod axis;
