@@ -48,16 +48,16 @@ use activity::spec::SpecError;
 pub use model::{Energy, FramePower, PARTS, Part, PowerModel};
 pub use pacing::{PacedFrame, PacedRun, Pacing, pace};
 pub use platform::{
-    Disturbance, Finish, Launch, Leakage, NumberProvenance, Platform, Rail, Range, Ranges, ScaledFrom,
-    System, UnitPower,
+    Disturbance, Finish, Launch, Leakage, Platform, Rail, Range, Ranges, ScaledFrom, System, UnitPower,
+    ValueSource,
 };
 pub use quantity::{
     Basis, Bound, Celsius, Exponent, Hertz, Interval, OutOfRange, Picojoules, Quantity, Ratio, Seconds,
     Share, Source, Sourced, Volts, Watts,
 };
 pub use structure::{
-    Charge, INTERPOLATION, IntervalNumber, LANE_MADDS, Memory, MemoryCost, REGISTER_BYTES, Scaling, Sram,
-    SramRun, Structure, madds,
+    Charge, INTERPOLATION, LANE_MADDS, Memory, MemoryCost, REGISTER_BYTES, Scaling, Sram, SramRun, Structure,
+    UncertainValue, madds,
 };
 pub use system::{Cause, Circumstances, Pulse, Surrounded, SurroundedFrame, overlay};
 pub use table::{EnergyRow, EnergyTable, Supply, TableEntry};

@@ -3,7 +3,7 @@
 //! and of how even gaps are, on all kinds of devices but one, and judges it on that one.
 //!
 //! `cargo bench -p traces --bench calibrate_confidence -- FIRST_SEED LAST_SEED [METHOD|STEP]`: METHOD in place
-//! of `auto`, or `auto` without STEP, one of `traces::frames::Step`.
+//! of `auto`, or `auto` without STEP, one of `traces::frames::FinderStep`.
 
 use std::error::Error;
 use std::process::ExitCode;

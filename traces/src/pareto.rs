@@ -1,7 +1,7 @@
 //! Frontiers of time and energy (Paper IV): the settings that no other dominates.
 
 use crate::table::{InputTable, TableReadError};
-use crate::units::{ColumnQuantity, UnitError, scale_with};
+use crate::units::{PhysicalQuantity, UnitError, scale_with};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::io::Write;
@@ -167,15 +167,17 @@ pub fn frontiers(
         let values = table.numbers(column)?;
         Ok(values.into_iter().map(|value| value * scale).collect())
     };
-    let unit = |column: &str, of: ColumnQuantity| scale_with(column, table.unit(column), of);
+    let unit = |column: &str, of: PhysicalQuantity| scale_with(column, table.unit(column), of);
     // A deviation without a unit in its name has that of the column it belongs to.
-    let deviations = |column: &Option<String>, (of, quantity): (&str, ColumnQuantity)| match column {
+    let deviations = |column: &Option<String>, (of, quantity): (&str, PhysicalQuantity)| match column {
         Some(column) => numbers(column, unit(column, quantity)?.or(unit(of, quantity)?).unwrap_or(1.0)),
         None => Ok(vec![0.0; table.rows()]),
     };
     let texts = |column: &String| table.texts(column);
-    let (time, energy) =
-        ((columns.time.as_str(), ColumnQuantity::Time), (columns.energy.as_str(), ColumnQuantity::Energy));
+    let (time, energy) = (
+        (columns.time.as_str(), PhysicalQuantity::Time),
+        (columns.energy.as_str(), PhysicalQuantity::Energy),
+    );
     let [times, energies] =
         [time, energy].map(|(column, of)| numbers(column, unit(column, of)?.unwrap_or(1.0)));
     let (times, energies) = (times?, energies?);

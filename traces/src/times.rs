@@ -1,6 +1,6 @@
 //! Files of times: marks of frames, or stamps of another clock.
 
-use crate::units::{ColumnQuantity, TIME_WORDS, UnitError, scale};
+use crate::units::{PhysicalQuantity, TIME_WORDS, UnitError, scale};
 use std::fs;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
@@ -55,7 +55,7 @@ pub enum TimesError {
         path: PathBuf,
         /// The line, from 1.
         line: usize,
-        /// Text of the line.
+        /// Text of the line that has no time.
         text: String,
         /// The error.
         reason: String,
@@ -118,7 +118,7 @@ impl Column {
             let found = names.join(", ");
             TimesError::Column { path: path.to_owned(), found }
         })?;
-        let unit = scale(names[index], ColumnQuantity::Time);
+        let unit = scale(names[index], PhysicalQuantity::Time);
         let unit = unit.map_err(|source| TimesError::Unit { path: path.to_owned(), source })?;
         Ok(Self { index, columns: names.len(), scale: unit.unwrap_or(1.0) })
     }

@@ -5,7 +5,7 @@ use thiserror::Error;
 
 /// Quantity of a column or an argument.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum ColumnQuantity {
+pub enum PhysicalQuantity {
     /// Times, s.
     Time,
     /// Voltages, V.
@@ -22,8 +22,8 @@ pub enum ColumnQuantity {
     Resistance,
 }
 
-impl ColumnQuantity {
-    /// In the plural, for messages.
+impl PhysicalQuantity {
+    /// Plural name, for messages.
     pub fn name(self) -> &'static str {
         match self {
             Self::Time => "times",
@@ -40,7 +40,7 @@ impl ColumnQuantity {
 /// A unit, and where its name is understood.
 struct Unit {
     name: &'static str,
-    quantity: ColumnQuantity,
+    quantity: PhysicalQuantity,
     /// Factor to s, V, A, W, J, Hz or ohm.
     scale: f64,
     places: u8,
@@ -57,74 +57,74 @@ const TABLE: u8 = 8;
 /// Behind a number in an argument of a command; case counts.
 const ARGUMENT: u8 = 16;
 
-const fn unit(name: &'static str, quantity: ColumnQuantity, scale: f64, places: u8) -> Unit {
+const fn unit(name: &'static str, quantity: PhysicalQuantity, scale: f64, places: u8) -> Unit {
     Unit { name, quantity, scale, places }
 }
 
 /// All units. Of two that differ in case alone, the first is meant where case does not decide.
 const UNITS: [Unit; 50] = [
-    unit("s", ColumnQuantity::Time, 1.0, TRACE | TABLE | ARGUMENT),
-    unit("sec", ColumnQuantity::Time, 1.0, METADATA | TABLE),
-    unit("second", ColumnQuantity::Time, 1.0, METADATA),
-    unit("seconds", ColumnQuantity::Time, 1.0, METADATA),
-    unit("ms", ColumnQuantity::Time, 1e-3, TRACE | TABLE | ARGUMENT),
-    unit("msec", ColumnQuantity::Time, 1e-3, METADATA | TABLE),
-    unit("us", ColumnQuantity::Time, 1e-6, TRACE | TABLE | ARGUMENT),
-    unit("usec", ColumnQuantity::Time, 1e-6, METADATA | TABLE),
-    unit("ns", ColumnQuantity::Time, 1e-9, TRACE | TABLE | ARGUMENT),
-    unit("min", ColumnQuantity::Time, 60.0, ARGUMENT),
-    unit("h", ColumnQuantity::Time, 3600.0, TABLE | ARGUMENT),
-    unit("kV", ColumnQuantity::Voltage, 1e3, TRACE | ARGUMENT),
-    unit("V", ColumnQuantity::Voltage, 1.0, TRACE | JLS | ARGUMENT),
-    unit("mV", ColumnQuantity::Voltage, 1e-3, TRACE | JLS | ARGUMENT),
-    unit("uV", ColumnQuantity::Voltage, 1e-6, TRACE | JLS | ARGUMENT),
-    unit("volt", ColumnQuantity::Voltage, 1.0, METADATA),
-    unit("volts", ColumnQuantity::Voltage, 1.0, METADATA),
-    unit("kA", ColumnQuantity::Current, 1e3, TRACE | ARGUMENT),
-    unit("A", ColumnQuantity::Current, 1.0, TRACE | JLS | ARGUMENT),
-    unit("mA", ColumnQuantity::Current, 1e-3, TRACE | JLS | ARGUMENT),
-    unit("uA", ColumnQuantity::Current, 1e-6, TRACE | JLS | ARGUMENT),
-    unit("nA", ColumnQuantity::Current, 1e-9, TRACE | JLS),
-    unit("amp", ColumnQuantity::Current, 1.0, METADATA),
-    unit("amps", ColumnQuantity::Current, 1.0, METADATA),
-    unit("ampere", ColumnQuantity::Current, 1.0, METADATA),
-    unit("kW", ColumnQuantity::Power, 1e3, TRACE | ARGUMENT),
-    unit("W", ColumnQuantity::Power, 1.0, TRACE | JLS | ARGUMENT),
-    unit("mW", ColumnQuantity::Power, 1e-3, TRACE | JLS | ARGUMENT),
-    unit("uW", ColumnQuantity::Power, 1e-6, TRACE | JLS | ARGUMENT),
-    unit("watt", ColumnQuantity::Power, 1.0, METADATA),
-    unit("watts", ColumnQuantity::Power, 1.0, METADATA),
-    unit("J", ColumnQuantity::Energy, 1.0, TABLE),
-    unit("mJ", ColumnQuantity::Energy, 1e-3, TABLE),
-    unit("uJ", ColumnQuantity::Energy, 1e-6, TABLE),
-    unit("nJ", ColumnQuantity::Energy, 1e-9, TABLE),
-    unit("kJ", ColumnQuantity::Energy, 1e3, TABLE),
-    unit("MJ", ColumnQuantity::Energy, 1e6, TABLE),
-    unit("Wh", ColumnQuantity::Energy, 3600.0, TABLE),
-    unit("mWh", ColumnQuantity::Energy, 3.6, TABLE),
-    unit("kWh", ColumnQuantity::Energy, 3.6e6, TABLE),
-    unit("Hz", ColumnQuantity::Rate, 1.0, ARGUMENT),
-    unit("kHz", ColumnQuantity::Rate, 1e3, ARGUMENT),
-    unit("MHz", ColumnQuantity::Rate, 1e6, ARGUMENT),
-    unit("GHz", ColumnQuantity::Rate, 1e9, ARGUMENT),
-    unit("Ohm", ColumnQuantity::Resistance, 1.0, ARGUMENT),
-    unit("mOhm", ColumnQuantity::Resistance, 1e-3, ARGUMENT),
-    unit("kOhm", ColumnQuantity::Resistance, 1e3, ARGUMENT),
-    unit("\u{3a9}", ColumnQuantity::Resistance, 1.0, ARGUMENT),
-    unit("m\u{3a9}", ColumnQuantity::Resistance, 1e-3, ARGUMENT),
-    unit("\u{2126}", ColumnQuantity::Resistance, 1.0, ARGUMENT),
+    unit("s", PhysicalQuantity::Time, 1.0, TRACE | TABLE | ARGUMENT),
+    unit("sec", PhysicalQuantity::Time, 1.0, METADATA | TABLE),
+    unit("second", PhysicalQuantity::Time, 1.0, METADATA),
+    unit("seconds", PhysicalQuantity::Time, 1.0, METADATA),
+    unit("ms", PhysicalQuantity::Time, 1e-3, TRACE | TABLE | ARGUMENT),
+    unit("msec", PhysicalQuantity::Time, 1e-3, METADATA | TABLE),
+    unit("us", PhysicalQuantity::Time, 1e-6, TRACE | TABLE | ARGUMENT),
+    unit("usec", PhysicalQuantity::Time, 1e-6, METADATA | TABLE),
+    unit("ns", PhysicalQuantity::Time, 1e-9, TRACE | TABLE | ARGUMENT),
+    unit("min", PhysicalQuantity::Time, 60.0, ARGUMENT),
+    unit("h", PhysicalQuantity::Time, 3600.0, TABLE | ARGUMENT),
+    unit("kV", PhysicalQuantity::Voltage, 1e3, TRACE | ARGUMENT),
+    unit("V", PhysicalQuantity::Voltage, 1.0, TRACE | JLS | ARGUMENT),
+    unit("mV", PhysicalQuantity::Voltage, 1e-3, TRACE | JLS | ARGUMENT),
+    unit("uV", PhysicalQuantity::Voltage, 1e-6, TRACE | JLS | ARGUMENT),
+    unit("volt", PhysicalQuantity::Voltage, 1.0, METADATA),
+    unit("volts", PhysicalQuantity::Voltage, 1.0, METADATA),
+    unit("kA", PhysicalQuantity::Current, 1e3, TRACE | ARGUMENT),
+    unit("A", PhysicalQuantity::Current, 1.0, TRACE | JLS | ARGUMENT),
+    unit("mA", PhysicalQuantity::Current, 1e-3, TRACE | JLS | ARGUMENT),
+    unit("uA", PhysicalQuantity::Current, 1e-6, TRACE | JLS | ARGUMENT),
+    unit("nA", PhysicalQuantity::Current, 1e-9, TRACE | JLS),
+    unit("amp", PhysicalQuantity::Current, 1.0, METADATA),
+    unit("amps", PhysicalQuantity::Current, 1.0, METADATA),
+    unit("ampere", PhysicalQuantity::Current, 1.0, METADATA),
+    unit("kW", PhysicalQuantity::Power, 1e3, TRACE | ARGUMENT),
+    unit("W", PhysicalQuantity::Power, 1.0, TRACE | JLS | ARGUMENT),
+    unit("mW", PhysicalQuantity::Power, 1e-3, TRACE | JLS | ARGUMENT),
+    unit("uW", PhysicalQuantity::Power, 1e-6, TRACE | JLS | ARGUMENT),
+    unit("watt", PhysicalQuantity::Power, 1.0, METADATA),
+    unit("watts", PhysicalQuantity::Power, 1.0, METADATA),
+    unit("J", PhysicalQuantity::Energy, 1.0, TABLE),
+    unit("mJ", PhysicalQuantity::Energy, 1e-3, TABLE),
+    unit("uJ", PhysicalQuantity::Energy, 1e-6, TABLE),
+    unit("nJ", PhysicalQuantity::Energy, 1e-9, TABLE),
+    unit("kJ", PhysicalQuantity::Energy, 1e3, TABLE),
+    unit("MJ", PhysicalQuantity::Energy, 1e6, TABLE),
+    unit("Wh", PhysicalQuantity::Energy, 3600.0, TABLE),
+    unit("mWh", PhysicalQuantity::Energy, 3.6, TABLE),
+    unit("kWh", PhysicalQuantity::Energy, 3.6e6, TABLE),
+    unit("Hz", PhysicalQuantity::Rate, 1.0, ARGUMENT),
+    unit("kHz", PhysicalQuantity::Rate, 1e3, ARGUMENT),
+    unit("MHz", PhysicalQuantity::Rate, 1e6, ARGUMENT),
+    unit("GHz", PhysicalQuantity::Rate, 1e9, ARGUMENT),
+    unit("Ohm", PhysicalQuantity::Resistance, 1.0, ARGUMENT),
+    unit("mOhm", PhysicalQuantity::Resistance, 1e-3, ARGUMENT),
+    unit("kOhm", PhysicalQuantity::Resistance, 1e3, ARGUMENT),
+    unit("\u{3a9}", PhysicalQuantity::Resistance, 1.0, ARGUMENT),
+    unit("m\u{3a9}", PhysicalQuantity::Resistance, 1e-3, ARGUMENT),
+    unit("\u{2126}", PhysicalQuantity::Resistance, 1.0, ARGUMENT),
 ];
 
 /// The signs for micro, U+00B5 and the Greek letter U+03BC, that names and units may have in place of `u`.
 pub(crate) const MICRO: [char; 2] = ['\u{b5}', '\u{3bc}'];
 
 /// The quantity that a word of the name of a trace's column stands for, in small letters.
-pub(crate) fn quantity_word(word: &str) -> Option<ColumnQuantity> {
+pub(crate) fn quantity_word(word: &str) -> Option<PhysicalQuantity> {
     match word {
-        "time" | "timestamp" | "t" => Some(ColumnQuantity::Time),
-        "voltage" | "volts" | "volt" => Some(ColumnQuantity::Voltage),
-        "current" | "amps" | "i" => Some(ColumnQuantity::Current),
-        "power" | "watts" | "p" => Some(ColumnQuantity::Power),
+        "time" | "timestamp" | "t" => Some(PhysicalQuantity::Time),
+        "voltage" | "volts" | "volt" => Some(PhysicalQuantity::Voltage),
+        "current" | "amps" | "i" => Some(PhysicalQuantity::Current),
+        "power" | "watts" | "p" => Some(PhysicalQuantity::Power),
         _ => None,
     }
 }
@@ -138,7 +138,7 @@ fn units(places: u8) -> impl Iterator<Item = &'static Unit> {
 
 /// Quantity and factor of a unit in any case, as a word of the name of a trace's column; `of` restricts the
 /// quantity.
-pub(crate) fn trace_unit(word: &str, of: Option<ColumnQuantity>) -> Option<(ColumnQuantity, f64)> {
+pub(crate) fn trace_unit(word: &str, of: Option<PhysicalQuantity>) -> Option<(PhysicalQuantity, f64)> {
     let fits = |unit: &&Unit| {
         unit.name.eq_ignore_ascii_case(word) && of.is_none_or(|quantity| unit.quantity == quantity)
     };
@@ -146,7 +146,7 @@ pub(crate) fn trace_unit(word: &str, of: Option<ColumnQuantity>) -> Option<(Colu
 }
 
 /// Quantity and factor of a unit that is written out in metadata, in any case.
-pub(crate) fn written_out_unit(text: &str) -> Option<(ColumnQuantity, f64)> {
+pub(crate) fn written_out_unit(text: &str) -> Option<(PhysicalQuantity, f64)> {
     let found = units(METADATA).find(|unit| unit.name.eq_ignore_ascii_case(text));
     found.map(|unit| (unit.quantity, unit.scale))
 }
@@ -167,7 +167,7 @@ pub(crate) fn jls_unit(text: &str) -> Option<f64> {
 /// assert_eq!(parse("2", Quantity::Time, "ms"), Some(2e-3));
 /// assert_eq!(parse("2 V", Quantity::Time, "s"), None);
 /// ```
-pub fn parse(text: &str, of: ColumnQuantity, bare: &str) -> Option<f64> {
+pub fn parse(text: &str, of: PhysicalQuantity, bare: &str) -> Option<f64> {
     let text = text.trim().replace(MICRO, "u");
     let known = || units(ARGUMENT).filter(|unit| unit.quantity == of);
     let number = |unit: &Unit, text: &str| Some(text.trim_end().parse::<f64>().ok()? * unit.scale);
@@ -178,7 +178,7 @@ pub fn parse(text: &str, of: ColumnQuantity, bare: &str) -> Option<f64> {
 
 /// A unit in the name of a table's column: exactly as it is written, or else without regard to case, when `M`
 /// is milli.
-fn table_unit(word: &str) -> Option<(ColumnQuantity, f64)> {
+fn table_unit(word: &str) -> Option<(PhysicalQuantity, f64)> {
     let exact = units(TABLE).find(|unit| unit.name == word);
     exact
         .or_else(|| units(TABLE).find(|unit| unit.name.eq_ignore_ascii_case(word)))
@@ -209,7 +209,7 @@ pub struct UnitError(String);
 ///
 /// # Errors
 /// [`UnitError`] if the unit is of something else, or may be.
-pub fn scale(column: &str, of: ColumnQuantity) -> Result<Option<f64>, UnitError> {
+pub fn scale(column: &str, of: PhysicalQuantity) -> Result<Option<f64>, UnitError> {
     let name = column.replace(MICRO, "u");
     let words: Vec<&str> =
         name.split(|c: char| !c.is_alphanumeric()).filter(|word| !word.is_empty()).collect();
@@ -235,7 +235,7 @@ pub fn scale(column: &str, of: ColumnQuantity) -> Result<Option<f64>, UnitError>
 ///
 /// # Errors
 /// [`UnitError`], also if that unit is not known or contradicts the name.
-pub fn scale_with(column: &str, unit: Option<&str>, of: ColumnQuantity) -> Result<Option<f64>, UnitError> {
+pub fn scale_with(column: &str, unit: Option<&str>, of: PhysicalQuantity) -> Result<Option<f64>, UnitError> {
     let named = scale(column, of)?;
     let Some(text) = unit.filter(|text| !text.is_empty()) else { return Ok(named) };
     match scale(text, of).ok().flatten() {
@@ -274,15 +274,15 @@ mod tests {
             ("TIME_MS", 1e-3),
             ("time_h", 3600.0),
         ] {
-            assert_eq!(scale(column, ColumnQuantity::Time), Ok(Some(expected)), "{column}");
+            assert_eq!(scale(column, PhysicalQuantity::Time), Ok(Some(expected)), "{column}");
         }
         for (column, expected) in
             [("energy[mJ]", 1e-3), ("energy_MJ", 1e6), ("energy_mWh", 3.6), ("E_J", 1.0)]
         {
-            assert_eq!(scale(column, ColumnQuantity::Energy), Ok(Some(expected)), "{column}");
+            assert_eq!(scale(column, PhysicalQuantity::Energy), Ok(Some(expected)), "{column}");
         }
         assert_eq!(
-            (scale("time", ColumnQuantity::Time), scale("energy", ColumnQuantity::Energy)),
+            (scale("time", PhysicalQuantity::Time), scale("energy", PhysicalQuantity::Energy)),
             (Ok(None), Ok(None))
         );
     }
@@ -299,16 +299,16 @@ mod tests {
             "time_ticks",
             "t [ps]",
         ] {
-            assert!(scale(column, ColumnQuantity::Time).is_err(), "{column}");
+            assert!(scale(column, PhysicalQuantity::Time).is_err(), "{column}");
         }
         for column in ["time_ms", "energy_nJ_per_pixel", "power_W", "energy_microjoules", "energy_pJ"] {
-            assert!(scale(column, ColumnQuantity::Energy).is_err(), "{column}");
+            assert!(scale(column, PhysicalQuantity::Energy).is_err(), "{column}");
         }
     }
 
     #[test]
     fn units_beside_names_count_and_contradict() {
-        let time = |column, unit| scale_with(column, Some(unit), ColumnQuantity::Time);
+        let time = |column, unit| scale_with(column, Some(unit), PhysicalQuantity::Time);
         assert_eq!(
             (time("time", "ms"), time("time_ms", "ms"), time("time_ms", "")),
             (Ok(Some(1e-3)), Ok(Some(1e-3)), Ok(Some(1e-3)))
@@ -320,18 +320,21 @@ mod tests {
 
     #[test]
     fn the_same_unit_may_be_known_in_one_place_and_not_in_another() {
-        assert_eq!((trace_unit("h", None), table_unit("h")), (None, Some((ColumnQuantity::Time, 3600.0))));
+        assert_eq!((trace_unit("h", None), table_unit("h")), (None, Some((PhysicalQuantity::Time, 3600.0))));
         assert_eq!(
             (trace_unit("sec", None), written_out_unit("Sec")),
-            (None, Some((ColumnQuantity::Time, 1.0)))
+            (None, Some((PhysicalQuantity::Time, 1.0)))
         );
         assert_eq!(
             (jls_unit("\u{b5}A"), jls_unit("\u{3bc}a"), jls_unit("kW")),
             (Some(1e-6), Some(1e-6), None)
         );
-        assert_eq!(trace_unit("MV", Some(ColumnQuantity::Voltage)), Some((ColumnQuantity::Voltage, 1e-3)));
-        assert_eq!(trace_unit("V", Some(ColumnQuantity::Time)), None);
-        assert_eq!((table_unit("min"), parse("1min", ColumnQuantity::Time, "s")), (None, Some(60.0)));
-        assert_eq!((jls_unit("nA"), parse("1nA", ColumnQuantity::Current, "A")), (Some(1e-9), None));
+        assert_eq!(
+            trace_unit("MV", Some(PhysicalQuantity::Voltage)),
+            Some((PhysicalQuantity::Voltage, 1e-3))
+        );
+        assert_eq!(trace_unit("V", Some(PhysicalQuantity::Time)), None);
+        assert_eq!((table_unit("min"), parse("1min", PhysicalQuantity::Time, "s")), (None, Some(60.0)));
+        assert_eq!((jls_unit("nA"), parse("1nA", PhysicalQuantity::Current, "A")), (Some(1e-9), None));
     }
 }

@@ -7,8 +7,8 @@ use glam::{DQuat, DVec3, Vec3};
 use crate::error::LoadError;
 use crate::material::Material;
 use crate::scene::{
-    Frustum, Graph, Local, Mesh, Motion, Node, Parts, Rig, Scene, SceneCamera, Settings, Spin, Trs, rotation,
-    tan_half,
+    Frustum, Graph, Local, Mesh, Motion, Node, Parts, Rig, Scene, SceneCamera, SceneSettings, Spin, Trs,
+    rotation, tan_half,
 };
 use crate::shapes::{checker, cuboid, gear, plane, propeller, sphere, torus};
 
@@ -44,13 +44,13 @@ fn tiny() -> Result<Scene, LoadError> {
         view: Some(Frustum::Perspective { tan_half_height: tan_half(45.0) }),
         near: None,
     };
-    parts.settings = Settings {
+    parts.settings = SceneSettings {
         width: 64,
         height: 48,
         samples: 4,
         frames: 0..4,
         lens_radius: 0.08,
-        ..Settings::default()
+        ..SceneSettings::default()
     };
     Scene::new(parts)
 }
@@ -102,7 +102,7 @@ fn scene() -> Result<Scene, LoadError> {
         near: None,
     };
     parts.background = Vec3::new(0.50, 0.62, 0.76);
-    parts.settings = Settings { frames: 0..36, lens_radius: 0.11, ..Settings::default() };
+    parts.settings = SceneSettings { frames: 0..36, lens_radius: 0.11, ..SceneSettings::default() };
     Scene::new(parts)
 }
 

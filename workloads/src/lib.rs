@@ -68,4 +68,4 @@ pub use material::{Alpha, Light, Material};
 pub use regime::Regime;
 pub use rendering::{Rendering, write_hits};
 pub use samples::{FixedSamples, SampleChoice, write_samples};
-pub use scene::{Frame, FrameError, FrameMesh, Overrides, Scene, Settings};
+pub use scene::{Frame, FrameError, FrameMesh, Overrides, Scene, SceneSettings};

@@ -32,7 +32,7 @@ use crate::job::{
     must_hold,
 };
 use crate::samples::SampleChoice;
-use crate::scene::Settings;
+use crate::scene::SceneSettings;
 
 /// Kind of the queries.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -115,7 +115,7 @@ impl OcclusionOptions {
 /// The job and its scene.
 struct Occlusion {
     options: OcclusionOptions,
-    settings: Settings,
+    settings: SceneSettings,
     samples: Arc<dyn SampleSource>,
     wall_scene: WallScene,
 }
@@ -140,7 +140,7 @@ pub(crate) const FLAGS: Flags = Flags {
 pub fn job(options: &OptionSource, request: &JobRequest<'_>) -> Result<Box<dyn Job>, LoadError> {
     let options: OcclusionOptions = options.read()?;
     options.check()?;
-    let settings = Settings { width: 512, height: 288, samples: 16, ..Settings::default() };
+    let settings = SceneSettings { width: 512, height: 288, samples: 16, ..SceneSettings::default() };
     let settings = settings.with(request.overrides)?;
     let samples = SampleChoice::load(&settings.table)?.source(settings.samples, request.seed)?.into();
     let OcclusionOptions { walls, slats, gaps, objects, motion, lens, .. } = options;
@@ -159,7 +159,7 @@ impl Draws for Occlusion {
     /// All frames show the same shutter interval.
     type Input = ();
 
-    fn settings(&self) -> &Settings {
+    fn settings(&self) -> &SceneSettings {
         &self.settings
     }
 

@@ -11,12 +11,12 @@ use crate::error::LoadError;
 use crate::job::{Drawn, Draws, IMAGE_SIZE, Job, JobError, JobRequest, Reduction};
 use crate::regime::Regime;
 use crate::samples::{SampleChoice, blur_warning};
-use crate::scene::{Frame, FrameMesh, Scene, Settings};
+use crate::scene::{Frame, FrameMesh, Scene, SceneSettings};
 
 /// Renderings of a scene in one pass per frame.
 pub struct Rendering {
     scene: Arc<Scene>,
-    settings: Settings,
+    settings: SceneSettings,
     table: SampleChoice,
     samples: Arc<dyn SampleSource>,
     seed: u64,
@@ -50,7 +50,7 @@ impl Rendering {
 impl Draws for Rendering {
     type Input = Frame;
 
-    fn settings(&self) -> &Settings {
+    fn settings(&self) -> &SceneSettings {
         &self.settings
     }
 
@@ -67,7 +67,7 @@ impl Draws for Rendering {
         let fewer = to.samples.and_then(|samples| self.table.source(samples, self.seed).ok());
         let samples: Arc<dyn SampleSource> = fewer.map_or_else(|| Arc::clone(&self.samples), Arc::from);
         let [width, height] = to.size;
-        let settings = Settings { width, height, samples: samples.per_pixel(), ..self.settings.clone() };
+        let settings = SceneSettings { width, height, samples: samples.per_pixel(), ..self.settings.clone() };
         let limit = to.max_triangles.unwrap_or(usize::MAX).max(1);
         Some(Box::new(Self {
             scene: Arc::clone(&self.scene),

@@ -35,7 +35,7 @@ pub fn note(path: &Path) {
 /// Record `path` and open it, as [`File::open`] does.
 ///
 /// # Errors
-/// Those of [`File::open`].
+/// Errors of [`File::open`].
 pub fn open(path: &Path) -> io::Result<File> {
     note(path);
     File::open(path)
@@ -44,7 +44,7 @@ pub fn open(path: &Path) -> io::Result<File> {
 /// Record `path` and read it, as [`std::fs::read`] does.
 ///
 /// # Errors
-/// Those of [`std::fs::read`].
+/// Errors of [`std::fs::read`].
 pub fn read(path: &Path) -> io::Result<Vec<u8>> {
     note(path);
     std::fs::read(path)
@@ -53,7 +53,7 @@ pub fn read(path: &Path) -> io::Result<Vec<u8>> {
 /// Record `path` and read it, as [`std::fs::read_to_string`] does.
 ///
 /// # Errors
-/// Those of [`std::fs::read_to_string`], such as text that is not UTF-8.
+/// Errors of [`std::fs::read_to_string`], such as text that is not UTF-8.
 pub fn read_to_string(path: &Path) -> io::Result<String> {
     note(path);
     std::fs::read_to_string(path)

@@ -49,7 +49,7 @@ pub trait Real:
     /// The number `value`.
     fn new(value: f64) -> Self;
 
-    /// Its value.
+    /// Value of the number.
     fn value(self) -> f64;
 
     /// `self b + c`, rounded after each operation; one multiply-add.

@@ -126,7 +126,7 @@ pub struct Platform {
 
 /// One number of a platform and its source.
 #[derive(Clone, Debug, PartialEq)]
-pub struct NumberProvenance<'a> {
+pub struct ValueSource<'a> {
     /// Field, for example `leakage.reference_w`.
     pub field: String,
     /// Value.
@@ -223,7 +223,7 @@ impl Platform {
 
     /// Every number with its source, in the order of the file. Energy rows have their own sources and are
     /// left out.
-    pub fn provenance(&self) -> Vec<NumberProvenance<'_>> {
+    pub fn provenance(&self) -> Vec<ValueSource<'_>> {
         let scale =
             self.energy_from.as_ref().map(|from| provenance("energy_from.core_scale", &from.core_scale));
         let mut list: Vec<_> = scale.into_iter().collect();
@@ -256,8 +256,8 @@ impl Platform {
     }
 }
 
-fn provenance<'a, T: Quantity>(field: &str, number: &'a Sourced<T>) -> NumberProvenance<'a> {
-    NumberProvenance {
+fn provenance<'a, T: Quantity>(field: &str, number: &'a Sourced<T>) -> ValueSource<'a> {
+    ValueSource {
         field: field.to_owned(),
         value: number.value(),
         unit: number.unit(),

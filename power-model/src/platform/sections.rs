@@ -2,7 +2,7 @@
 
 use serde::Deserialize;
 
-use super::{NumberProvenance, Platform, provenance};
+use super::{Platform, ValueSource, provenance};
 use crate::quantity::{Bound, Hertz, Interval, Ratio, Seconds, Share, Source, Sourced, Watts};
 
 /// Power of the system apart from drawing. All parts are optional.
@@ -110,7 +110,7 @@ impl Disturbance {
         self.0.variation.value()
     }
 
-    fn provenance(&self) -> [NumberProvenance<'_>; 5] {
+    fn provenance(&self) -> [ValueSource<'_>; 5] {
         let field = |name: &str| format!("system.disturbances.{}.{name}", self.0.name);
         [
             provenance(&field("period_s"), &self.0.period_s),
@@ -124,7 +124,7 @@ impl Disturbance {
 
 impl System {
     /// Every number with its source, in the order of the file.
-    pub(crate) fn provenance(&self) -> Vec<NumberProvenance<'_>> {
+    pub(crate) fn provenance(&self) -> Vec<ValueSource<'_>> {
         let mut list = Vec::new();
         list.extend(self.frame_cap_hz.as_ref().map(|cap| provenance("system.frame_cap_hz", cap)));
         if let Some(launch) = &self.launch {

@@ -75,14 +75,14 @@ impl Structure {
 
     /// Area in square millimetres on the node `node_nm`: memories, logic and the die of an embedded DRAM.
     /// Wires between units and interfaces to pins and to memory are not in it.
-    pub fn area_mm2(&self, node_nm: u32) -> IntervalNumber {
+    pub fn area_mm2(&self, node_nm: u32) -> UncertainValue {
         weights::area_mm2(self, node_nm)
     }
 }
 
 /// A number with the ends of its interval.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct IntervalNumber {
+pub struct UncertainValue {
     /// Low end.
     pub low: f64,
     /// Nominal value.
@@ -91,7 +91,7 @@ pub struct IntervalNumber {
     pub high: f64,
 }
 
-impl IntervalNumber {
+impl UncertainValue {
     /// The number 1, known exactly.
     pub const ONE: Self = Self { low: 1.0, nominal: 1.0, high: 1.0 };
 
@@ -129,13 +129,13 @@ impl IntervalNumber {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Scaling {
     /// Energy of each event, indexed by event.
-    events: Vec<IntervalNumber>,
+    events: Vec<UncertainValue>,
     /// Leakage of the core.
-    pub leakage: IntervalNumber,
+    pub leakage: UncertainValue,
     /// What the clock tree of each unit drives, at one clock; indexed by unit.
-    clock_trees: Vec<IntervalNumber>,
+    clock_trees: Vec<UncertainValue>,
     /// Leakage or refresh of the last-level cache and of the eDRAM, indexed by unit.
-    retention: Vec<IntervalNumber>,
+    retention: Vec<UncertainValue>,
     /// Clock of each unit, indexed by unit.
     clocks: [f64; Unit::COUNT],
     /// Channels of the off-chip memory.
@@ -146,10 +146,10 @@ impl Default for Scaling {
     /// That of a GPU over itself.
     fn default() -> Self {
         Self {
-            events: vec![IntervalNumber::ONE; Event::COUNT],
-            leakage: IntervalNumber::ONE,
-            clock_trees: vec![IntervalNumber::ONE; Unit::COUNT],
-            retention: vec![IntervalNumber::ONE; Unit::COUNT],
+            events: vec![UncertainValue::ONE; Event::COUNT],
+            leakage: UncertainValue::ONE,
+            clock_trees: vec![UncertainValue::ONE; Unit::COUNT],
+            retention: vec![UncertainValue::ONE; Unit::COUNT],
             clocks: [1.0; Unit::COUNT],
             channels: 1.0,
         }
@@ -175,17 +175,17 @@ impl Scaling {
     }
 
     /// Energy of `event`.
-    pub fn event(&self, event: Event) -> IntervalNumber {
+    pub fn event(&self, event: Event) -> UncertainValue {
         self.events[event as usize]
     }
 
     /// Watts of the clock tree of `unit`, which follow its clock.
-    pub fn clock_tree(&self, unit: Unit) -> IntervalNumber {
+    pub fn clock_tree(&self, unit: Unit) -> UncertainValue {
         self.clock_trees[unit as usize].map(|ratio| ratio * self.clocks[unit as usize])
     }
 
     /// Leakage or refresh of `unit`, if it is a level below the L2.
-    pub fn retention(&self, unit: Unit) -> IntervalNumber {
+    pub fn retention(&self, unit: Unit) -> UncertainValue {
         self.retention[unit as usize]
     }
 
@@ -218,13 +218,13 @@ struct Ratio<'a> {
 
 impl<'a> Ratio<'a> {
     /// Ratio of what `weigh` gives for both: nominal, and over all assumptions.
-    fn of(&self, weigh: impl Fn(&Case, &Structure) -> f64) -> IntervalNumber {
+    fn of(&self, weigh: impl Fn(&Case, &Structure) -> f64) -> UncertainValue {
         self.over(|case| weigh(case, self.own) / weigh(case, self.home))
     }
 
-    fn over(&self, ratio: impl Fn(&Case) -> f64) -> IntervalNumber {
+    fn over(&self, ratio: impl Fn(&Case) -> f64) -> UncertainValue {
         let nominal = self.cases.iter().find(|case| case.is_nominal(self.node_nm)).map_or(1.0, &ratio);
-        IntervalNumber::over(nominal, self.cases.iter().map(ratio))
+        UncertainValue::over(nominal, self.cases.iter().map(ratio))
     }
 
     /// Pairs of a memory and the one that the platform's numbers are for.
@@ -233,8 +233,8 @@ impl<'a> Ratio<'a> {
         own.filter_map(|memory| Some((memory, self.home.like(memory).or_else(|| self.stated.like(memory))?)))
     }
 
-    fn events(&self) -> Vec<IntervalNumber> {
-        let mut events = vec![IntervalNumber::ONE; Event::COUNT];
+    fn events(&self) -> Vec<UncertainValue> {
+        let mut events = vec![UncertainValue::ONE; Event::COUNT];
         for (own, home) in self.pairs() {
             for &charge in &own.charges {
                 events[charge.event as usize] = self.over(|case| charged(case, charge, own, home));
@@ -243,24 +243,24 @@ impl<'a> Ratio<'a> {
         events
     }
 
-    fn clock_tree(&self, unit: Unit) -> IntervalNumber {
+    fn clock_tree(&self, unit: Unit) -> UncertainValue {
         let is_there = |structure: &Structure| self.cases[0].clock_load(structure, unit) > 0.0;
         match (is_there(self.own), is_there(self.home), is_there(self.stated)) {
             (true, true, _) => self.of(|case, structure| case.clock_load(structure, unit)),
             (true, false, true) => {
                 self.over(|case| case.clock_load(self.own, unit) / case.clock_load(self.stated, unit))
             }
-            _ => IntervalNumber::ONE,
+            _ => UncertainValue::ONE,
         }
     }
 
-    fn retention(&self, unit: Unit) -> IntervalNumber {
+    fn retention(&self, unit: Unit) -> UncertainValue {
         match self.pairs().find(|(own, _)| own.unit == unit) {
             Some((own, home)) if unit == Unit::Llc => {
                 self.over(|case| case.memory_leakage_mw(own) / case.memory_leakage_mw(home))
             }
-            Some((own, home)) if unit == Unit::Edram => IntervalNumber::ONE.map(|_| own.bytes / home.bytes),
-            _ => IntervalNumber::ONE,
+            Some((own, home)) if unit == Unit::Edram => UncertainValue::ONE.map(|_| own.bytes / home.bytes),
+            _ => UncertainValue::ONE,
         }
     }
 }

@@ -4,7 +4,7 @@
 
 use activity::{Event, Unit};
 
-use super::{IntervalNumber, Memory, Structure};
+use super::{Memory, Structure, UncertainValue};
 
 /// Powers of the accesses a cycle by which the bytes of a memory grow to have room for them: 0 where banks
 /// serve them, which only needs luck and a switch, and 1 for a copy for each. Between, a true multi-port
@@ -107,18 +107,18 @@ fn on_core(structure: &Structure) -> impl Iterator<Item = &Memory> {
 }
 
 /// Area of `structure` in square millimetres on the node `node_nm`.
-pub(super) fn area_mm2(structure: &Structure, node_nm: u32) -> IntervalNumber {
+pub(super) fn area_mm2(structure: &Structure, node_nm: u32) -> UncertainValue {
     let cases: Vec<Case> = Case::all().into_iter().filter(|case| case.is_nearest(node_nm)).collect();
     let nominal = cases.iter().find(|case| case.is_nominal(node_nm));
     let mm2 = |case: &Case| case.memories_mm2(structure, node_nm);
-    let memories = IntervalNumber::over(nominal.map_or(0.0, mm2), cases.iter().map(mm2));
+    let memories = UncertainValue::over(nominal.map_or(0.0, mm2), cases.iter().map(mm2));
     let square_mm2 = f64::from(node_nm) * f64::from(node_nm) * 1e-12;
     let logic = structure.madds.iter().sum::<f64>() * square_mm2;
     let edram: f64 =
         structure.memories.iter().filter(|m| m.unit == Unit::Edram).map(|m| m.bytes * m.copies).sum();
     let [low, middle, high] = MADD_SQUARES.map(|squares| squares * logic);
     let [edram_low, edram_middle, edram_high] = EDRAM_MM2_PER_BYTE.map(|mm2| mm2 * edram);
-    memories.plus(IntervalNumber { low, nominal: middle, high }).plus(IntervalNumber {
+    memories.plus(UncertainValue { low, nominal: middle, high }).plus(UncertainValue {
         low: edram_low,
         nominal: edram_middle,
         high: edram_high,

@@ -2,8 +2,8 @@
 
 use activity::{Event, Unit};
 use power_model::{
-    Bound, Charge, INTERPOLATION, IntervalNumber, Memory, MemoryCost, PowerModel, Scaling, Sram, SramRun,
-    Structure,
+    Bound, Charge, INTERPOLATION, Memory, MemoryCost, PowerModel, Scaling, Sram, SramRun, Structure,
+    UncertainValue,
 };
 
 use super::common::{reference, table};
@@ -105,7 +105,7 @@ fn equal_structures_have_ratios_of_one() {
     let home = structure(16_384.0, 3.0);
     assert_eq!(Scaling::new(&home.clone(), &home, &home, 28), Scaling::default());
     assert_eq!(Scaling::default().farthest().0, 1.0);
-    assert_eq!(Scaling::default().event(Event::L2Reads), IntervalNumber::ONE);
+    assert_eq!(Scaling::default().event(Event::L2Reads), UncertainValue::ONE);
 }
 
 /// Watts of files have a range; those computed from a machine that nobody could build do not, so that it is

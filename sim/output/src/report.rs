@@ -39,7 +39,7 @@ pub struct RunReport<'a> {
     /// Energy by part over the run.
     pub parts: Vec<PartRow>,
     /// One row per frame.
-    pub frames: Vec<FrameRow>,
+    pub frames: Vec<ReportFrame>,
     /// Pixels of a frame, for joules per pixel; 0 leaves that column empty.
     pub pixels: u64,
     /// One row per name of a pass.
@@ -219,7 +219,7 @@ pub struct FrameNumbers {
 
 /// Row of a frame.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
-pub struct FrameRow {
+pub struct ReportFrame {
     /// Number of the frame.
     pub frame: u64,
     /// Start in seconds.

@@ -3,7 +3,7 @@
 use cpu_time::ProcessTime;
 use output::table::{counted, digits, grouped, si};
 use pipeline::Gpu;
-use power_model::IntervalNumber;
+use power_model::UncertainValue;
 use serde::Serialize;
 use timing::{FrameClock, Level, Recorder};
 use warnings::Warning;
@@ -55,7 +55,7 @@ pub struct DryTimed {
     /// Name of the energy table.
     pub energy_table: String,
     /// Area of the GPU in square millimetres.
-    pub area_mm2: IntervalNumber,
+    pub area_mm2: UncertainValue,
     /// Timing level.
     pub timing: &'static str,
     /// Pacing of frames.
@@ -241,7 +241,7 @@ impl Expected {
 }
 
 /// Area as text.
-pub(super) fn area_text(area_mm2: &IntervalNumber) -> String {
+pub(super) fn area_text(area_mm2: &UncertainValue) -> String {
     let [low, nominal, high] = [area_mm2.low, area_mm2.nominal, area_mm2.high].map(digits);
     format!("{nominal} mm2 ({low} to {high}), without interfaces")
 }

@@ -290,7 +290,7 @@ fn queues(gpu: &GpuSpec, unit: Unit) -> [Memory; 2] {
 /// More hardware costs more, and the GPU of a platform keeps its numbers.
 #[cfg(test)]
 pub(crate) mod tests {
-    use power_model::{Bound, EnergyTable, IntervalNumber, PowerModel};
+    use power_model::{Bound, EnergyTable, PowerModel, UncertainValue};
     use proptest::prelude::*;
 
     use super::*;
@@ -459,8 +459,8 @@ pub(crate) mod tests {
         let platform = Platform::builtin("reference").unwrap();
         let larger = changed("reference", &[("pipeline.memory.texture.entries", 4096.0)]);
         let scaling = scaling(&larger, &platform).unwrap();
-        assert_eq!(scaling.event(Event::DepthLines), IntervalNumber::ONE);
-        assert_eq!(scaling.clock_tree(Unit::Depth), IntervalNumber::ONE);
+        assert_eq!(scaling.event(Event::DepthLines), UncertainValue::ONE);
+        assert_eq!(scaling.clock_tree(Unit::Depth), UncertainValue::ONE);
         let lines = scaling.event(Event::TextureLines);
         assert!(1.5 < lines.low && lines.low <= lines.nominal && lines.nominal <= lines.high, "{lines:?}");
         assert_eq!(lines, scaling.event(Event::TextureMisses));
@@ -471,7 +471,7 @@ pub(crate) mod tests {
         let platform = Platform::builtin("reference").unwrap();
         let fast = changed("reference", &[("core_hz", 800e6)]);
         let scaling = scaling(&fast, &platform).unwrap();
-        assert_eq!(scaling.leakage, IntervalNumber::ONE);
+        assert_eq!(scaling.leakage, UncertainValue::ONE);
         for unit in Unit::ALL.into_iter().filter(|unit| !unit.is_optional()) {
             let ratio = if unit == Unit::Dram { 1.0 } else { 2.0 };
             assert_eq!(scaling.clock_tree(unit).nominal, ratio, "{}", unit.name());

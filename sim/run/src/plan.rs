@@ -9,7 +9,7 @@ use power_model::{Bound, EnergyTable, ModelError, Pacing, Platform, PowerModel, 
 use traces::device::RATES_HZ;
 use warnings::Warning;
 use workloads::job::{JobRequest, Reduction};
-use workloads::{Job, Rendering, Settings, catalog};
+use workloads::{Job, Rendering, SceneSettings, catalog};
 
 use crate::RunError;
 use crate::changes::{ChangedFile, Changes, InputFile};
@@ -257,7 +257,7 @@ pub fn refuse_beside_images(requested: &[String]) -> Result<(), RunError> {
 
 /// Size of a run, from the parts of a plan.
 fn size_of(
-    settings: &Settings,
+    settings: &SceneSettings,
     viewport: Viewport,
     pacing: Pacing,
     platform: &Platform,

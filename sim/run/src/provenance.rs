@@ -6,7 +6,7 @@ use std::{fs, io};
 
 use activity::Unit;
 use output::dir::sha256_of;
-use power_model::{IntervalNumber, PowerModel};
+use power_model::{PowerModel, UncertainValue};
 use serde::de::IgnoredAny;
 use serde::{Deserialize, Serialize};
 use serde_json::error::Category;
@@ -212,7 +212,7 @@ impl Recorded {
 }
 
 /// Area of the GPU of `plan` on the node of its platform, in square millimetres.
-pub fn area_mm2(plan: &Plan) -> IntervalNumber {
+pub fn area_mm2(plan: &Plan) -> UncertainValue {
     structure(&plan.gpu).area_mm2(plan.platform.node_nm)
 }
 
@@ -224,11 +224,11 @@ pub struct HardwareSummary {
     /// GPU for which the numbers of the platform hold.
     pub made_for: String,
     /// Area in square millimetres.
-    pub area_mm2: IntervalNumber,
+    pub area_mm2: UncertainValue,
     /// Leakage in watts, of the core.
     pub leakage_w: f64,
     /// Leakage over that of the GPU of the platform.
-    pub leakage_ratio: IntervalNumber,
+    pub leakage_ratio: UncertainValue,
     /// Power between frames in watts.
     pub idle_w: f64,
     /// Power of each unit while it is busy in watts, without its events.

@@ -9,7 +9,7 @@ use output::plot::{
     part_colour,
 };
 use output::report::{
-    CounterRow, FactRow, FileLink, FrameNumbers, FrameRow, PartRow, PassRow, ReportImage, ReportPlot,
+    CounterRow, FactRow, FileLink, FrameNumbers, PartRow, PassRow, ReportFrame, ReportImage, ReportPlot,
     RunReport, UnitRow, WarningRow, WorkRow,
 };
 use output::table::{count_or_digits, grouped, shell_line, si};
@@ -116,9 +116,9 @@ fn parts(outcome: &FinishedRun) -> Vec<PartRow> {
     parts_in_use(outcome).into_iter().map(row).collect()
 }
 
-fn frames(outcome: &FinishedRun) -> Vec<FrameRow> {
+fn frames(outcome: &FinishedRun) -> Vec<ReportFrame> {
     let rows = outcome.summary.frames.iter().zip(outcome.measurement.by_true_frame());
-    rows.map(|(row, measured)| FrameRow {
+    rows.map(|(row, measured)| ReportFrame {
         frame: u64::from(row.frame),
         start_s: row.start_s,
         busy_s: Some(row.busy_s),

@@ -7,7 +7,7 @@ use std::str::FromStr;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use experiments::stress::measure::SWITCHES;
 use pipeline::Features;
-use traces::units::{self, ColumnQuantity};
+use traces::units::{self, PhysicalQuantity};
 
 /// Parser of one of some values, each with its name and a sentence for the help.
 pub(super) fn named<T: Clone + Send + Sync + 'static, const N: usize>(
@@ -147,7 +147,7 @@ fn number<T: FromStr + Into<f64> + Copy>(
 
 /// A quantity as an argument: how it is called, and how it is written.
 struct Expected {
-    quantity: ColumnQuantity,
+    quantity: PhysicalQuantity,
     /// Name with article, for messages.
     what: &'static str,
     /// The unit of a bare number.
@@ -157,7 +157,7 @@ struct Expected {
 }
 
 const fn expected(
-    quantity: ColumnQuantity,
+    quantity: PhysicalQuantity,
     what: &'static str,
     bare: &'static str,
     examples: &'static str,
@@ -165,13 +165,13 @@ const fn expected(
     Expected { quantity, what, bare, examples }
 }
 
-const RATE: Expected = expected(ColumnQuantity::Rate, "a rate", "Hz", "50kHz or 1MHz");
-const TIME: Expected = expected(ColumnQuantity::Time, "a time", "s", "2.5s, 20us or 1min");
-const SHORT_TIME: Expected = expected(ColumnQuantity::Time, "a time", "ms", "4ms or 20us");
-const VOLTAGE: Expected = expected(ColumnQuantity::Voltage, "a voltage", "V", "12V or 5mV");
-const CURRENT: Expected = expected(ColumnQuantity::Current, "a current", "A", "2A or 5mA");
-const POWER: Expected = expected(ColumnQuantity::Power, "a power", "W", "14W or 250mW");
-const RESISTANCE: Expected = expected(ColumnQuantity::Resistance, "a resistance", "Ohm", "0.1Ohm or 4mOhm");
+const RATE: Expected = expected(PhysicalQuantity::Rate, "a rate", "Hz", "50kHz or 1MHz");
+const TIME: Expected = expected(PhysicalQuantity::Time, "a time", "s", "2.5s, 20us or 1min");
+const SHORT_TIME: Expected = expected(PhysicalQuantity::Time, "a time", "ms", "4ms or 20us");
+const VOLTAGE: Expected = expected(PhysicalQuantity::Voltage, "a voltage", "V", "12V or 5mV");
+const CURRENT: Expected = expected(PhysicalQuantity::Current, "a current", "A", "2A or 5mA");
+const POWER: Expected = expected(PhysicalQuantity::Power, "a power", "W", "14W or 250mW");
+const RESISTANCE: Expected = expected(PhysicalQuantity::Resistance, "a resistance", "Ohm", "0.1Ohm or 4mOhm");
 
 impl Expected {
     /// Parses a finite value; the result is in SI.

@@ -1,7 +1,7 @@
 //! Design-space exploration: many runs from one file, on one machine or a cluster.
 //!
 //! ```text
-//! SweepSpec (axes) -> points -> SweepPlan (ids) -> Folder -> Work: execute -> a file per point -> merge -> results.parquet
+//! SweepSpec (axes) -> points -> SweepPlan (ids) -> Folder -> ShardWork: execute -> a file per point -> merge -> results.parquet
 //! ```
 //!
 //! - [`SweepSpec`]: the sweep file. [`SweepPlan`]: its points with ids, every value tried.
@@ -12,6 +12,18 @@
 //! - [`Search`]: points that an optimizer requests.
 //!
 //! A point has no state but its file, so a sweep may be stopped at any moment and continued anywhere.
+//!
+//! ```
+//! use sweep::SweepPlan;
+//!
+//! let folder = tempfile::tempdir()?;
+//! let file = folder.path().join("two.ron");
+//! let axes = r#"[Values(path: "gpu.pipeline.tile_px", values: [4, 8])]"#;
+//! std::fs::write(&file, format!(r#"(name: "two", settings: {{"scene": "tiny"}}, axes: {axes})"#))?;
+//! let plan = SweepPlan::load(&file, false, None)?;
+//! assert_eq!(plan.points.len(), 2);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 mod ask;
 mod axis;
@@ -40,8 +52,8 @@ pub use merge::{RESULTS, merge};
 pub use plan::{Point, SweepPlan};
 pub use points::combinations;
 pub use report::{
-    Cost, Effect, Interaction, Measure, NearBest, NoEffect, Pair, PointFailure, RatedDesign, ReportOptions,
-    Share, SweepDesign, SweepReport, Winner,
+    Cost, Effect, Interaction, Measure, NearBest, NoEffect, Pair, RatedDesign, ReportOptions, Share,
+    SweepDesign, SweepReport, UnmeasuredPoint, Winner,
 };
 pub use setting::{Setting, Text, is_option, misspelt, with};
 pub use slurm::{Scripts, SlurmArray, SlurmJob, submit};

@@ -314,7 +314,7 @@ mod tests {
         ],
     "#;
 
-    /// SweepPlan of these designs with further fields or at a level, run in a folder: costs by settings without
+    /// Plan of these designs with further fields or at a level, run in a folder: costs by settings without
     /// the level, at the last level.
     fn costs(scene: &str, size: &str, more: &str) -> (HashMap<String, Cost>, Status, f64) {
         let folder = tempfile::tempdir().unwrap();

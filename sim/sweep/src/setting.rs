@@ -79,14 +79,14 @@ const WITHIN: [&str; 5] = ["gpu.PATH", "platform.PATH", "table.PATH", "scene.PAT
 /// First name of paths to options of a workload.
 const WORKLOAD: &str = "workload";
 
-/// Stage of a run, in order.
+/// Stage of a run, in order, and the settings that it is the first to depend on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Stage {
-    /// Frames are drawn: packets and counts.
+    /// Settings of the work and of the pipeline: frames are drawn, to packets and counts.
     Drawing,
-    /// Packets are timed.
+    /// Settings of units, clocks and the timing level: packets are timed.
     Timing,
-    /// Timelines get energies.
+    /// Settings of platform, energy table and pacing: timelines get energies.
     Power,
 }
 

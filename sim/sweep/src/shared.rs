@@ -21,7 +21,7 @@ const MAX_BYTES: usize = 1 << 30;
 /// Points with the same drawing.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Group<'a> {
-    /// Those with the same times together.
+    /// Points of the group, those with the same times together.
     timings: Vec<Vec<&'a Point>>,
 }
 
@@ -57,7 +57,7 @@ impl<'a> Group<'a> {
     /// once `stop` holds.
     ///
     /// # Errors
-    /// Those of `done`.
+    /// Errors of `done`.
     pub fn run(
         &self,
         plan: &SweepPlan,

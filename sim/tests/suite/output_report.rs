@@ -1,7 +1,7 @@
 //! The report: whole without a network, harmless for any text in it, complete without what is missing.
 
 use output::report::{
-    CounterRow, FactRow, FileLink, FrameNumbers, FrameRow, Headline, PartRow, PassRow, ReportImage,
+    CounterRow, FactRow, FileLink, FrameNumbers, Headline, PartRow, PassRow, ReportFrame, ReportImage,
     ReportPlot, RunReport, UnitRow, WarningRow, WorkRow,
 };
 use output::{Claim, Destination, MeanSd, plot};
@@ -24,9 +24,9 @@ fn svg() -> String {
     frame.picture(&plot::PlotStyle::default()).svg().unwrap()
 }
 
-fn frames(text: &str, number: f64) -> Vec<FrameRow> {
+fn frames(text: &str, number: f64) -> Vec<ReportFrame> {
     let numbers = Some(FrameNumbers { time_s: number, energy_j: number, power_w: number });
-    let row = FrameRow {
+    let row = ReportFrame {
         frame: 1,
         start_s: number,
         busy_s: Some(number),
@@ -34,7 +34,7 @@ fn frames(text: &str, number: f64) -> Vec<FrameRow> {
         truth: None,
         flags: text.to_owned(),
     };
-    vec![row.clone(), FrameRow { measured: None, ..row }]
+    vec![row.clone(), ReportFrame { measured: None, ..row }]
 }
 
 fn counter(text: &str, number: f64) -> CounterRow {

@@ -52,7 +52,7 @@ impl Results {
         self.folder.join(relative)
     }
 
-    /// Its bytes.
+    /// Bytes of the file `relative`.
     ///
     /// # Panics
     /// If it is not there.
@@ -60,7 +60,7 @@ impl Results {
         fs::read(self.path(relative)).unwrap_or_else(|error| panic!("{relative}: {error}"))
     }
 
-    /// Its text.
+    /// Text of the file `relative`.
     ///
     /// # Panics
     /// If it is not there or not UTF-8.

@@ -164,14 +164,14 @@ impl Signal {
     }
 }
 
-/// An instrument that recorded signals.
+/// Definition of a source: an instrument that recorded signals.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Instrument {
+pub struct SourceDefinition {
     /// Name, vendor, model, version and serial number, as far as they are there.
     texts: Vec<String>,
 }
 
-impl Instrument {
+impl SourceDefinition {
     fn text(&self, index: usize) -> &str {
         self.texts.get(index).map_or("", String::as_str)
     }
@@ -202,7 +202,7 @@ impl Instrument {
 pub(crate) struct Definitions {
     pub signals: Vec<Signal>,
     /// By their numbers.
-    pub sources: BTreeMap<u16, Instrument>,
+    pub sources: BTreeMap<u16, SourceDefinition>,
 }
 
 /// The texts of a definition, each ended by a zero and 0x1f.
@@ -218,7 +218,7 @@ impl Definitions {
         let mut sources = BTreeMap::new();
         each(file, SOURCE, |head, payload| {
             if head.meta < MAX_NUMBER {
-                sources.insert(head.meta, Instrument { texts: texts(payload, SOURCE_TEXTS) });
+                sources.insert(head.meta, SourceDefinition { texts: texts(payload, SOURCE_TEXTS) });
             }
         })?;
         let mut signals = BTreeMap::<u16, Signal>::new();

@@ -44,7 +44,7 @@ mod write;
 use std::io;
 use thiserror::Error;
 
-pub use definitions::{Instrument, Signal, SignalName};
+pub use definitions::{Signal, SignalName, SourceDefinition};
 pub use read::{Reader, SampleReader};
 pub use write::JlsWriter;
 

@@ -1,7 +1,7 @@
 //! Reading a recording, signal by signal.
 
 use crate::chunk::{ChunkFile, ChunkHeader};
-use crate::definitions::{self, Definitions, Instrument, Signal};
+use crate::definitions::{self, Definitions, Signal, SourceDefinition};
 use crate::{DATA, FIXED_RATE, FRONT, INDEX, JSON, JlsReadError, SIGNAL_MASK, Sample, USER_DATA, field};
 use std::path::{Path, PathBuf};
 
@@ -35,7 +35,7 @@ impl Reader {
     }
 
     /// The source of a signal, if the file has it.
-    pub fn source(&self, signal: &Signal) -> Option<&Instrument> {
+    pub fn source(&self, signal: &Signal) -> Option<&SourceDefinition> {
         self.definitions.sources.get(&signal.source)
     }
 

@@ -19,7 +19,7 @@ pub enum MarkError {
     NotFinite {
         /// Which number.
         what: &'static str,
-        /// Value of the number, s.
+        /// Rejected value, s.
         value_s: f64,
     },
     /// A marked start is outside the trace, or too near its ends for a usable window.

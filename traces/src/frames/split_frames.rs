@@ -34,9 +34,9 @@ const MARGIN_STARTS: usize = 2;
 
 /// The assessment of each start.
 pub(super) struct SplitFrames {
-    /// Confidence factor of each.
+    /// Factor on the confidence of each start: 1, or less where starts alternate.
     pub confidence_factors: Vec<f64>,
-    /// Whether each splits a frame.
+    /// Whether each start splits a frame.
     pub splits_frame: Vec<bool>,
 }
 

@@ -7,7 +7,7 @@ use std::path::Path;
 use super::samples::Description;
 use super::time_base::Stamps;
 use super::{CURRENT_A, POWER_W, ReadError, ReadOptions, Repair, TIME_S, VOLTAGE_V};
-use crate::units::{ColumnQuantity, MICRO, quantity_word, trace_unit, written_out_unit};
+use crate::units::{MICRO, PhysicalQuantity, quantity_word, trace_unit, written_out_unit};
 
 /// A column that is read.
 #[derive(Clone, Debug, PartialEq)]
@@ -90,7 +90,7 @@ impl Default for RowBatch {
 }
 
 /// The columns of each rail, by what they measure.
-type Rails = BTreeMap<String, BTreeMap<ColumnQuantity, Picked>>;
+type Rails = BTreeMap<String, BTreeMap<PhysicalQuantity, Picked>>;
 
 /// Chooses the columns of a trace.
 pub(super) fn layout(path: &Path, names: &[String], options: &ReadOptions) -> Result<Layout, ReadError> {
@@ -128,11 +128,11 @@ pub(super) fn layout_of_unnamed(
     }
     let mut guess = Vec::new();
     let time =
-        layout.time.iter_mut().filter(|_| options.time.is_none()).map(|time| (time, ColumnQuantity::Time));
+        layout.time.iter_mut().filter(|_| options.time.is_none()).map(|time| (time, PhysicalQuantity::Time));
     let rail = layout.rails.first().copied().filter(|_| !by_number);
     let values = layout.values.iter_mut().enumerate().filter_map(|(index, column)| match rail? {
-        Rail::Measured { voltage, .. } if voltage == index => Some((column, ColumnQuantity::Voltage)),
-        _ => Some((column, ColumnQuantity::Current)),
+        Rail::Measured { voltage, .. } if voltage == index => Some((column, PhysicalQuantity::Voltage)),
+        _ => Some((column, PhysicalQuantity::Current)),
     });
     for (column, of) in time.chain(values) {
         (column.name, column.has_unit) = (names[column.index].clone(), false);
@@ -158,7 +158,7 @@ fn missing(path: &Path, names: &[String], column: &str) -> ReadError {
 }
 
 /// A column by its name, else by its number from 1.
-fn pick(path: &Path, names: &[String], column: &str, of: ColumnQuantity) -> Result<Picked, ReadError> {
+fn pick(path: &Path, names: &[String], column: &str, of: PhysicalQuantity) -> Result<Picked, ReadError> {
     let named = names.iter().position(|name| name.eq_ignore_ascii_case(column));
     let numbered =
         || column.parse::<usize>().ok().and_then(|n| n.checked_sub(1)).filter(|&n| n < names.len());
@@ -183,7 +183,7 @@ fn pick(path: &Path, names: &[String], column: &str, of: ColumnQuantity) -> Resu
 /// # Errors
 /// [`ReadError::Unit`] if name and unit contradict each other, or the unit is of something else;
 /// [`ReadError::UnitUnknown`].
-fn scale_by(path: &Path, picked: &Picked, text: &str, of: ColumnQuantity) -> Result<f64, ReadError> {
+fn scale_by(path: &Path, picked: &Picked, text: &str, of: PhysicalQuantity) -> Result<f64, ReadError> {
     if text.is_empty() {
         return Ok(picked.scale);
     }
@@ -202,10 +202,10 @@ fn scale_by(path: &Path, picked: &Picked, text: &str, of: ColumnQuantity) -> Res
 fn by_hand(path: &Path, names: &[String], options: &ReadOptions) -> Result<Layout, ReadError> {
     let pick = |column: &Option<String>, of| column.as_deref().map(|c| pick(path, names, c, of)).transpose();
     let time = match &options.time {
-        Some(column) => Some(self::pick(path, names, column, ColumnQuantity::Time)?),
+        Some(column) => Some(self::pick(path, names, column, PhysicalQuantity::Time)?),
         None => time_column(path, names)?,
     };
-    if let Some(power) = pick(&options.power, ColumnQuantity::Power)? {
+    if let Some(power) = pick(&options.power, PhysicalQuantity::Power)? {
         return Ok(Layout {
             time,
             values: vec![power],
@@ -216,8 +216,8 @@ fn by_hand(path: &Path, names: &[String], options: &ReadOptions) -> Result<Layou
         });
     }
     let current =
-        pick(&options.current, ColumnQuantity::Current)?.ok_or_else(|| missing(path, names, CURRENT_A))?;
-    let (values, rail) = match (options.fixed_voltage_v, pick(&options.voltage, ColumnQuantity::Voltage)?) {
+        pick(&options.current, PhysicalQuantity::Current)?.ok_or_else(|| missing(path, names, CURRENT_A))?;
+    let (values, rail) = match (options.fixed_voltage_v, pick(&options.voltage, PhysicalQuantity::Voltage)?) {
         (Some(volts), _) => (vec![current], Rail::Specified { volts, current: 0 }),
         (None, Some(voltage)) => (vec![voltage, current], Rail::Measured { voltage: 0, current: 1 }),
         (None, None) => return Err(missing(path, names, VOLTAGE_V)),
@@ -229,7 +229,7 @@ fn by_hand(path: &Path, names: &[String], options: &ReadOptions) -> Result<Layou
 fn time_column(path: &Path, names: &[String]) -> Result<Option<Picked>, ReadError> {
     let mut times = names.iter().enumerate().filter_map(|(index, name)| {
         let named = parse_name(name)
-            .filter(|named| named.quantity == ColumnQuantity::Time && named.rail.is_empty())?;
+            .filter(|named| named.quantity == PhysicalQuantity::Time && named.rail.is_empty())?;
         Some(Picked { index, name: name.clone(), scale: named.scale, has_unit: named.has_unit })
     });
     let first = times.next();
@@ -250,7 +250,7 @@ fn time_column(path: &Path, names: &[String]) -> Result<Option<Picked>, ReadErro
 fn by_name(path: &Path, names: &[String], options: &ReadOptions) -> Result<Layout, ReadError> {
     let mut rails = Rails::new();
     for (index, name) in names.iter().enumerate() {
-        let Some(named) = parse_name(name).filter(|named| named.quantity != ColumnQuantity::Time) else {
+        let Some(named) = parse_name(name).filter(|named| named.quantity != PhysicalQuantity::Time) else {
             continue;
         };
         let picked = Picked { index, name: name.clone(), scale: named.scale, has_unit: named.has_unit };
@@ -262,7 +262,7 @@ fn by_name(path: &Path, names: &[String], options: &ReadOptions) -> Result<Layou
         }
     }
     let time = match &options.time {
-        Some(column) => Some(pick(path, names, column, ColumnQuantity::Time)?),
+        Some(column) => Some(pick(path, names, column, PhysicalQuantity::Time)?),
         None => time_column(path, names)?,
     };
     let mut layout = Layout { time, ..Layout::default() };
@@ -273,14 +273,14 @@ fn by_name(path: &Path, names: &[String], options: &ReadOptions) -> Result<Layou
 }
 
 /// The column name of our own writers.
-fn native_name(quantity: ColumnQuantity) -> &'static str {
+fn native_name(quantity: PhysicalQuantity) -> &'static str {
     match quantity {
-        ColumnQuantity::Time => TIME_S,
-        ColumnQuantity::Voltage => VOLTAGE_V,
-        ColumnQuantity::Current => CURRENT_A,
-        ColumnQuantity::Power => POWER_W,
+        PhysicalQuantity::Time => TIME_S,
+        PhysicalQuantity::Voltage => VOLTAGE_V,
+        PhysicalQuantity::Current => CURRENT_A,
+        PhysicalQuantity::Power => POWER_W,
         // Traces have no columns of these.
-        ColumnQuantity::Energy | ColumnQuantity::Rate | ColumnQuantity::Resistance => quantity.name(),
+        PhysicalQuantity::Energy | PhysicalQuantity::Rate | PhysicalQuantity::Resistance => quantity.name(),
     }
 }
 
@@ -297,14 +297,15 @@ fn chosen(
         let whole: Rails = rails
             .iter()
             .filter(|(_, columns)| {
-                columns.contains_key(&ColumnQuantity::Current) || columns.contains_key(&ColumnQuantity::Power)
+                columns.contains_key(&PhysicalQuantity::Current)
+                    || columns.contains_key(&PhysicalQuantity::Power)
             })
             .map(|(name, columns)| (name.clone(), columns.clone()))
             .collect();
         if !whole.is_empty() {
             return Ok(whole);
         }
-        let column = if rails.values().any(|c| c.contains_key(&ColumnQuantity::Voltage)) {
+        let column = if rails.values().any(|c| c.contains_key(&PhysicalQuantity::Voltage)) {
             CURRENT_A
         } else {
             VOLTAGE_V
@@ -326,20 +327,20 @@ impl Layout {
     /// # Errors
     /// [`ReadError::Unit`] if they contradict the names, [`ReadError::UnitUnknown`] if they are not known.
     pub fn with_units(&mut self, path: &Path, units: &BTreeMap<String, String>) -> Result<(), ReadError> {
-        let put = |picked: &mut Picked, of: ColumnQuantity| match units.get(&picked.name) {
+        let put = |picked: &mut Picked, of: PhysicalQuantity| match units.get(&picked.name) {
             Some(unit) => scale_by(path, picked, unit, of).map(|scale| {
                 (picked.scale, picked.has_unit) = (scale, picked.has_unit || !unit.is_empty());
             }),
             None => Ok(()),
         };
-        self.time.as_mut().map_or(Ok(()), |time| put(time, ColumnQuantity::Time))?;
+        self.time.as_mut().map_or(Ok(()), |time| put(time, PhysicalQuantity::Time))?;
         for rail in &self.rails {
             let columns = match *rail {
                 Rail::Measured { voltage, current } => {
-                    vec![(voltage, ColumnQuantity::Voltage), (current, ColumnQuantity::Current)]
+                    vec![(voltage, PhysicalQuantity::Voltage), (current, PhysicalQuantity::Current)]
                 }
-                Rail::Specified { current, .. } => vec![(current, ColumnQuantity::Current)],
-                Rail::Power { power } => vec![(power, ColumnQuantity::Power)],
+                Rail::Specified { current, .. } => vec![(current, PhysicalQuantity::Current)],
+                Rail::Power { power } => vec![(power, PhysicalQuantity::Power)],
             };
             columns.into_iter().try_for_each(|(index, of)| put(&mut self.values[index], of))?;
         }
@@ -352,23 +353,23 @@ impl Layout {
         names: &[String],
         options: &ReadOptions,
         rail: &str,
-        mut columns: BTreeMap<ColumnQuantity, Picked>,
+        mut columns: BTreeMap<PhysicalQuantity, Picked>,
     ) -> Result<(), ReadError> {
         let prefix = if rail.is_empty() { String::new() } else { format!("{rail}_") };
-        let rail_of = match (columns.remove(&ColumnQuantity::Current), options.fixed_voltage_v) {
+        let rail_of = match (columns.remove(&PhysicalQuantity::Current), options.fixed_voltage_v) {
             (Some(current), Some(volts)) => Rail::Specified { volts, current: self.value(current) },
-            (Some(current), None) => match columns.remove(&ColumnQuantity::Voltage) {
+            (Some(current), None) => match columns.remove(&PhysicalQuantity::Voltage) {
                 Some(voltage) => {
                     Rail::Measured { voltage: self.value(voltage), current: self.value(current) }
                 }
                 None => return Err(missing(path, names, &format!("{prefix}{VOLTAGE_V}"))),
             },
-            (None, _) => match columns.remove(&ColumnQuantity::Power) {
+            (None, _) => match columns.remove(&PhysicalQuantity::Power) {
                 Some(power) => Rail::Power { power: self.value(power) },
                 None => return Err(missing(path, names, &format!("{prefix}{CURRENT_A}"))),
             },
         };
-        self.unread.extend(columns.remove(&ColumnQuantity::Power).map(|power| power.name));
+        self.unread.extend(columns.remove(&PhysicalQuantity::Power).map(|power| power.name));
         self.rails.push(rail_of);
         self.names.push(rail.to_owned());
         Ok(())
@@ -383,7 +384,7 @@ impl Layout {
 /// The meaning of a column's name.
 #[derive(Clone, Debug, PartialEq)]
 struct ColumnName {
-    quantity: ColumnQuantity,
+    quantity: PhysicalQuantity,
     /// Factor to s, V, A or W.
     scale: f64,
     rail: String,
@@ -394,7 +395,7 @@ struct ColumnName {
 }
 
 /// Quantity and factor of a unit beside a name; `None` if it is not known.
-fn unit(text: &str) -> Option<(ColumnQuantity, f64)> {
+fn unit(text: &str) -> Option<(PhysicalQuantity, f64)> {
     let symbol = |text: &str| {
         let found = parse_name(&format!("_{text}")).filter(|name| name.has_unit && name.rail.is_empty());
         found.map(|name| (name.quantity, name.scale))
@@ -434,12 +435,12 @@ fn parse_name(name: &str) -> Option<ColumnName> {
 }
 
 /// `power_MW` are megawatts; where all is in capitals, `M` says nothing.
-fn is_mega(name: &str, unit: Option<(&str, ColumnQuantity, f64)>) -> bool {
+fn is_mega(name: &str, unit: Option<(&str, PhysicalQuantity, f64)>) -> bool {
     let mega = |token: &str| {
         token.starts_with('M') && unit.is_some_and(|(unit, _, _)| token.eq_ignore_ascii_case(unit))
     };
     name.contains(char::is_lowercase)
-        && unit.is_some_and(|(unit, of, _)| of != ColumnQuantity::Time && unit.len() == 2)
+        && unit.is_some_and(|(unit, of, _)| of != PhysicalQuantity::Time && unit.len() == 2)
         && name
             .split(|c: char| !c.is_alphanumeric())
             .any(|token| mega(token) && token == token.to_uppercase())
@@ -496,37 +497,37 @@ mod tests {
         assert!(of(&other).unwrap_err().to_string().contains("of rail ram"));
     }
 
-    fn read(name: &str) -> Option<(ColumnQuantity, f64, String)> {
+    fn read(name: &str) -> Option<(PhysicalQuantity, f64, String)> {
         parse_name(name).map(|named| (named.quantity, named.scale, named.rail))
     }
 
     #[test]
     fn names_of_recorders_are_parse_name() {
         let is = |quantity, scale, rail: &str| Some((quantity, scale, rail.to_owned()));
-        assert_eq!(read("voltage_V"), is(ColumnQuantity::Voltage, 1.0, ""));
-        assert_eq!(read("CURRENT_a"), is(ColumnQuantity::Current, 1.0, ""));
-        assert_eq!(read("time_ns"), is(ColumnQuantity::Time, 1e-9, ""));
-        assert_eq!(read("Timestamp(ms)"), is(ColumnQuantity::Time, 1e-3, ""));
-        assert_eq!(read("Main(mA)"), is(ColumnQuantity::Current, 1e-3, "main"));
-        assert_eq!(read("Main Voltage(V)"), is(ColumnQuantity::Voltage, 1.0, "main"));
-        assert_eq!(read("gpu_power_W"), is(ColumnQuantity::Power, 1.0, "gpu"));
-        assert_eq!(read("current_A_cpu"), is(ColumnQuantity::Current, 1.0, "cpu"));
+        assert_eq!(read("voltage_V"), is(PhysicalQuantity::Voltage, 1.0, ""));
+        assert_eq!(read("CURRENT_a"), is(PhysicalQuantity::Current, 1.0, ""));
+        assert_eq!(read("time_ns"), is(PhysicalQuantity::Time, 1e-9, ""));
+        assert_eq!(read("Timestamp(ms)"), is(PhysicalQuantity::Time, 1e-3, ""));
+        assert_eq!(read("Main(mA)"), is(PhysicalQuantity::Current, 1e-3, "main"));
+        assert_eq!(read("Main Voltage(V)"), is(PhysicalQuantity::Voltage, 1.0, "main"));
+        assert_eq!(read("gpu_power_W"), is(PhysicalQuantity::Power, 1.0, "gpu"));
+        assert_eq!(read("current_A_cpu"), is(PhysicalQuantity::Current, 1.0, "cpu"));
         assert_eq!(read("note"), None);
-        assert_eq!(read("power_kW"), is(ColumnQuantity::Power, 1e3, ""));
-        assert_eq!(read("power_MW"), is(ColumnQuantity::Power, 1e6, ""));
-        assert_eq!(read("power_mW"), is(ColumnQuantity::Power, 1e-3, ""));
-        assert_eq!(read("POWER_MW"), is(ColumnQuantity::Power, 1e-3, ""));
+        assert_eq!(read("power_kW"), is(PhysicalQuantity::Power, 1e3, ""));
+        assert_eq!(read("power_MW"), is(PhysicalQuantity::Power, 1e6, ""));
+        assert_eq!(read("power_mW"), is(PhysicalQuantity::Power, 1e-3, ""));
+        assert_eq!(read("POWER_MW"), is(PhysicalQuantity::Power, 1e-3, ""));
         for name in ["current_\u{b5}A", "current (\u{3bc}A)"] {
-            assert_eq!(read(name), is(ColumnQuantity::Current, 1e-6, ""), "{name}");
+            assert_eq!(read(name), is(PhysicalQuantity::Current, 1e-6, ""), "{name}");
         }
     }
 
     #[test]
     fn units_alone_are_symbols_or_words_and_others_are_not_known() {
-        assert_eq!(unit("\u{3bc}A"), Some((ColumnQuantity::Current, 1e-6)));
-        assert_eq!(unit("[mA]"), Some((ColumnQuantity::Current, 1e-3)));
-        assert_eq!(unit("Volts"), Some((ColumnQuantity::Voltage, 1.0)));
-        assert_eq!(unit("msec"), Some((ColumnQuantity::Time, 1e-3)));
+        assert_eq!(unit("\u{3bc}A"), Some((PhysicalQuantity::Current, 1e-6)));
+        assert_eq!(unit("[mA]"), Some((PhysicalQuantity::Current, 1e-3)));
+        assert_eq!(unit("Volts"), Some((PhysicalQuantity::Voltage, 1.0)));
+        assert_eq!(unit("msec"), Some((PhysicalQuantity::Time, 1e-3)));
         for text in ["milliamps", "mAmp", "ticks", "min", "furlong", "power", "t"] {
             assert_eq!(unit(text), None, "{text}");
         }

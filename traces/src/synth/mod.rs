@@ -146,19 +146,19 @@ impl SynthScene {
     ///
     /// # Errors
     /// [`SynthError`] where rate, bits or noise are out of range.
-    pub fn record(&self, recording: &RecorderSpec) -> Result<Trace, SynthError> {
-        let noise_w = libm::sqrt(self.variance_w2()) * libm::pow(10.0, -recording.snr_db / 20.0);
+    pub fn record(&self, recorder: &RecorderSpec) -> Result<Trace, SynthError> {
+        let noise_w = libm::sqrt(self.variance_w2()) * libm::pow(10.0, -recorder.snr_db / 20.0);
         let device = Device::new(DeviceSpec {
             name: "synthetic".to_owned(),
-            rate_hz: recording.rate_hz,
+            rate_hz: recorder.rate_hz,
             rail_v: RAIL_V,
             rail_ohm: 0.0,
             current_range_a: [-4.0, 4.0],
             voltage_range_v: [-6.0, 6.0],
-            bits: recording.bits,
+            bits: recorder.bits,
             current_noise_a: noise_w / RAIL_V,
             voltage_noise_v: 0.0,
-            seed: recording.seed,
+            seed: recorder.seed,
             ..DeviceSpec::default()
         })?;
         Ok(device.sample(&self.curve, self.curve.start_s(), self.curve.end_s())?.trace)

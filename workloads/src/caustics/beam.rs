@@ -5,7 +5,7 @@ use glam::DVec3;
 use pipeline::Lane;
 
 /// A beam: the points `sum b_i ((1 - t) open_i + t close_i)` for barycentric weights `b` and `t` in [0, 1].
-/// Its flux is uniform over the generator triangle `open`.
+/// The flux of a beam is uniform over the generator triangle `open`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Beam {
     /// The generator triangle.

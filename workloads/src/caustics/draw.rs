@@ -10,12 +10,12 @@ use rayon::prelude::*;
 
 use super::bound::BoundingVolume;
 use super::light::{PixelInBeam, Seen};
-use super::{Beam, BeamMethod, DrawnLight, Eye};
+use super::{Beam, BeamMethod, Eye, LightQuantity};
 
 /// An image of light with its work; pixels row by row from the top left.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LightPicture {
-    /// Light of each pixel, in the unit of the requested [`DrawnLight`]; empty if none was requested.
+    /// Light of each pixel, in the unit of the requested [`LightQuantity`]; empty if none was requested.
     pub light: Vec<f64>,
     /// Shader executions of each pixel.
     pub runs: Vec<u32>,
@@ -62,7 +62,7 @@ impl LightPicture {
 
 /// Draws `beams` by `method`. With `light`, sums the light in the order of the beams; otherwise counts
 /// executions only.
-pub fn draw(beams: &[Beam], eye: &Eye, method: BeamMethod, light: Option<DrawnLight>) -> LightPicture {
+pub fn draw(beams: &[Beam], eye: &Eye, method: BeamMethod, light: Option<LightQuantity>) -> LightPicture {
     draw_with_work(beams, eye, method, light, false).0
 }
 
@@ -71,7 +71,7 @@ pub(super) fn draw_with_work(
     beams: &[Beam],
     eye: &Eye,
     method: BeamMethod,
-    light: Option<DrawnLight>,
+    light: Option<LightQuantity>,
     log: bool,
 ) -> (LightPicture, Vec<Covered>) {
     let seen: Vec<Option<Seen>> = beams.par_iter().map(|beam| eye.see(beam)).collect();
@@ -124,7 +124,7 @@ impl Band {
         seen: &[Option<Seen>],
         eye: &Eye,
         method: BeamMethod,
-        light: Option<DrawnLight>,
+        light: Option<LightQuantity>,
         log: bool,
     ) {
         let mut cover = Cover::new(eye, method, self.rows[0]..self.rows[1]);
@@ -142,7 +142,7 @@ impl Band {
         (self.tiles, self.tests) = (cover.tiles, cover.tests);
     }
 
-    fn shade(&mut self, eye: &Eye, seen: &Seen, light: Option<DrawnLight>, first: [u32; 2], pixels: u64) {
+    fn shade(&mut self, eye: &Eye, seen: &Seen, light: Option<LightQuantity>, first: [u32; 2], pixels: u64) {
         let mut unshaded = pixels;
         while unshaded != 0 {
             let bit = unshaded.trailing_zeros();

@@ -21,7 +21,7 @@ pub struct Floor {
 
 /// Quantity that is drawn.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum DrawnLight {
+pub enum LightQuantity {
     /// Light in the volume: fluence along the ray of a pixel, in watts per metre. Times the scattering
     /// coefficient, it is what a camera sees.
     Volume,
@@ -39,7 +39,7 @@ pub(super) struct PixelInBeam<'a> {
     pub times: Option<[TimeIntervals; 2]>,
 }
 
-impl DrawnLight {
+impl LightQuantity {
     /// Light of a beam at a pixel centre.
     pub(super) fn shade(&self, lane: &Lane, pixel: &PixelInBeam<'_>) -> f64 {
         match self {

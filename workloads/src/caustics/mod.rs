@@ -11,8 +11,8 @@
 //! - [`BeamMethod`]: the moving triangle, and bounding volumes: the prism of Ernst et al. (2005), the refined
 //!   bound of Liktor and Dachsbacher (2011), the convex hull.
 //! - [`Squares`]: the same light by photons, as a reference for images.
-//! - [`Eye`], [`draw()`]: light and shader executions of every pixel, in the volume ([`DrawnLight::Volume`]) or on
-//!   the floor ([`DrawnLight::Floor`]).
+//! - [`Eye`], [`draw()`]: light and shader executions of every pixel, in the volume ([`LightQuantity::Volume`]) or on
+//!   the floor ([`LightQuantity::Floor`]).
 //! - [`Coverage`], [`accuracy_warnings`]: a method compared with brute force, and warnings about inaccurate beams.
 //! - [`job()`]: the workload.
 //!
@@ -35,14 +35,14 @@ use crate::error::LoadError;
 use crate::job::{
     Drawn, Draws, Fact, Flag, Flags, Job, JobError, JobOptions, JobRequest, OptionSource, facts, must_hold,
 };
-use crate::scene::Settings;
+use crate::scene::SceneSettings;
 pub use beam::{Beam, Hit};
 pub use bound::BeamMethod;
 use draw::draw_with_work;
 pub use draw::{LightPicture, draw};
 use generator::Ocean;
 use light::Seen;
-pub use light::{DrawnLight, Eye, Floor, Squares, error};
+pub use light::{Eye, Floor, LightQuantity, Squares, error};
 pub use shader::draw_on;
 use shader::tone_on;
 
@@ -116,7 +116,7 @@ impl CausticsOptions {
 struct Caustics {
     options: CausticsOptions,
     ocean: Ocean,
-    settings: Settings,
+    settings: SceneSettings,
 }
 
 /// Run options in use. The image has no samples, lens or shutter; a frame is an instant.
@@ -129,13 +129,13 @@ pub(crate) const FLAGS: Flags = Flags { uses: &[Flag::Size], instead: &[] };
 pub fn job(options: &OptionSource, request: &JobRequest<'_>) -> Result<Box<dyn Job>, LoadError> {
     let options: CausticsOptions = options.read()?;
     options.check()?;
-    let settings = Settings {
+    let settings = SceneSettings {
         width: 512,
         height: 288,
         samples: 1,
         table: "none".to_owned(),
         frame_rate_hz: 30.0,
-        ..Settings::default()
+        ..SceneSettings::default()
     };
     let settings = settings.with(request.overrides)?;
     let CausticsOptions { cells, side_m, depth_m, wave_m, slope, .. } = options;
@@ -151,7 +151,7 @@ impl Draws for Caustics {
     /// Time of the waves, in seconds.
     type Input = f64;
 
-    fn settings(&self) -> &Settings {
+    fn settings(&self) -> &SceneSettings {
         &self.settings
     }
 
@@ -175,10 +175,10 @@ impl Draws for Caustics {
 }
 
 impl Caustics {
-    fn light(&self) -> DrawnLight {
+    fn light(&self) -> LightQuantity {
         match self.options.look {
-            LightView::Volume => DrawnLight::Volume,
-            LightView::Floor => DrawnLight::Floor(Floor { height_m: -self.options.depth_m }),
+            LightView::Volume => LightQuantity::Volume,
+            LightView::Floor => LightQuantity::Floor(Floor { height_m: -self.options.depth_m }),
         }
     }
 
@@ -418,8 +418,8 @@ mod tests {
         let hardware = hardware();
         for method in BeamMethod::ALL {
             let mut gpu = Gpu::without_packets(&hardware).unwrap();
-            let (picture, _) = draw_on(&mut gpu, &beams, &eye, method, DrawnLight::Volume).unwrap();
-            assert_eq!(picture, draw(&beams, &eye, method, Some(DrawnLight::Volume)), "{method:?}");
+            let (picture, _) = draw_on(&mut gpu, &beams, &eye, method, LightQuantity::Volume).unwrap();
+            assert_eq!(picture, draw(&beams, &eye, method, Some(LightQuantity::Volume)), "{method:?}");
             // Still bodies are moved to the image once, moving triangles at both ends.
             let counts = gpu.finish().counts();
             let bytes = if method == BeamMethod::Moving { 24 } else { 12 };

@@ -16,7 +16,7 @@ use super::draw::{
     within_reach,
 };
 use super::light::{PixelInBeam, Seen};
-use super::{Beam, BeamMethod, DrawnLight, Eye};
+use super::{Beam, BeamMethod, Eye, LightQuantity};
 
 /// Bytes of a vertex at one end of a beam.
 const VERTEX_BYTES: u32 = 12;
@@ -84,7 +84,7 @@ pub fn draw_on(
     beams: &[Beam],
     eye: &Eye,
     method: BeamMethod,
-    light: DrawnLight,
+    light: LightQuantity,
 ) -> Result<(LightPicture, LightBuffer), PassError> {
     let seen: Vec<Option<Seen>> = beams.iter().map(|beam| eye.see(beam)).collect();
     let viewport = eye.viewport();
@@ -267,7 +267,7 @@ struct LightShader<'a> {
     eye: &'a Eye,
     seen: &'a [Option<Seen>],
     faces: &'a [Face],
-    light: DrawnLight,
+    light: LightQuantity,
     buffer: LightBuffer,
     input: Input,
     /// Marks of the tiles, row by row.

@@ -17,7 +17,7 @@ use crate::job::{
     Drawn, Draws, Fact, Flag, Flags, Job, JobError, JobOptions, JobRequest, Need, OptionSource, facts,
     must_hold,
 };
-use crate::scene::Settings;
+use crate::scene::SceneSettings;
 
 /// Options of the job.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -95,7 +95,7 @@ struct Collision {
     narrow: bool,
     viewport: Viewport,
     objects: Vec<Object>,
-    settings: Settings,
+    settings: SceneSettings,
 }
 
 facts! {
@@ -117,12 +117,12 @@ pub fn job(options: &OptionSource, request: &JobRequest<'_>) -> Result<Box<dyn J
     let options: CollisionOptions = options.read()?;
     options.check()?;
     let CollisionOptions { resolution, bins, method, narrow, .. } = options;
-    let settings = Settings {
+    let settings = SceneSettings {
         width: 3 * resolution,
         height: resolution,
         samples: 1,
         table: "none".to_owned(),
-        ..Settings::default()
+        ..SceneSettings::default()
     };
     let search = PairSearch { resolution, bins, method, zoom: false };
     let settings = settings.with(request.overrides)?;
@@ -141,7 +141,7 @@ impl Draws for Collision {
     /// All frames search the same motion.
     type Input = ();
 
-    fn settings(&self) -> &Settings {
+    fn settings(&self) -> &SceneSettings {
         &self.settings
     }
 

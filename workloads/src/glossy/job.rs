@@ -15,7 +15,8 @@ use crate::job::{
 };
 use crate::material::Material;
 use crate::scene::{
-    Frame, Frustum, Graph, Local, Node, Overrides, Parts, Rig, Scene, SceneCamera, Settings, Trs, tan_half,
+    Frame, Frustum, Graph, Local, Node, Overrides, Parts, Rig, Scene, SceneCamera, SceneSettings, Trs,
+    tan_half,
 };
 use crate::shapes;
 
@@ -241,7 +242,7 @@ pub fn default_scene(below: bool) -> Result<Scene, LoadError> {
         near: None,
     };
     parts.background = Vec3::new(0.45, 0.55, 0.70);
-    parts.settings = Settings { width: 320, height: 180, samples: 16, ..Settings::default() };
+    parts.settings = SceneSettings { width: 320, height: 180, samples: 16, ..SceneSettings::default() };
     Scene::new(parts)
 }
 

@@ -17,7 +17,7 @@ use twox_hash::xxhash3_128;
 use warnings::Warning;
 
 use crate::regime::Regime;
-use crate::scene::{Frame, FrameError, Overrides, Scene, Settings};
+use crate::scene::{Frame, FrameError, Overrides, Scene, SceneSettings};
 
 pub(crate) use options::{Flag, Flags, must_hold};
 pub use options::{JobOptions, Need, OptionSource};
@@ -94,7 +94,7 @@ pub trait Draws: Sync + Send {
     type Input: Serialize;
 
     /// Size of the image, frames and frame rate.
-    fn settings(&self) -> &Settings;
+    fn settings(&self) -> &SceneSettings;
 
     /// Warnings about the job's sources, such as a scene file.
     fn warnings(&self) -> &[Warning] {
@@ -143,7 +143,7 @@ pub trait DrawsScene: Sync + Send {
     fn scene(&self) -> &Scene;
 
     /// Size of the image, frames and frame rate.
-    fn settings(&self) -> &Settings {
+    fn settings(&self) -> &SceneSettings {
         self.scene().settings()
     }
 
@@ -157,7 +157,7 @@ pub trait DrawsScene: Sync + Send {
 impl<D: DrawsScene> Draws for D {
     type Input = Frame;
 
-    fn settings(&self) -> &Settings {
+    fn settings(&self) -> &SceneSettings {
         DrawsScene::settings(self)
     }
 
@@ -191,7 +191,7 @@ pub struct Reduction {
 
 impl Reduction {
     /// Images about `target_px` wide, but at most `max` times smaller along each axis; larger ones are not enlarged.
-    pub fn to_width(settings: &Settings, target_px: u32, max: u32) -> Self {
+    pub fn to_width(settings: &SceneSettings, target_px: u32, max: u32) -> Self {
         let by = (settings.width / target_px).clamp(1, max);
         let size = [settings.width, settings.height].map(|side| side.div_ceil(by));
         Self { size, samples: None, max_triangles: None }
@@ -222,7 +222,7 @@ pub trait ReadyFrame {
 /// What a run draws: a rendering of a scene, or a workload. Every type that implements [`Draws`] is a job.
 pub trait Job: Sync + Send {
     /// Size of the image, frames and frame rate.
-    fn settings(&self) -> &Settings;
+    fn settings(&self) -> &SceneSettings;
 
     /// Warnings about the job's sources, such as a scene file.
     fn warnings(&self) -> &[Warning];
@@ -261,7 +261,7 @@ pub trait Job: Sync + Send {
 }
 
 impl<D: Draws> Job for D {
-    fn settings(&self) -> &Settings {
+    fn settings(&self) -> &SceneSettings {
         Draws::settings(self)
     }
 

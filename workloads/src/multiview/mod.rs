@@ -22,7 +22,7 @@ use crate::error::LoadError;
 use crate::job::{
     Drawn, DrawsScene, Fact, Flag, Flags, Job, JobError, JobOptions, JobRequest, Need, OptionSource, facts,
 };
-use crate::scene::{Frame, Overrides, Scene, Settings};
+use crate::scene::{Frame, Overrides, Scene, SceneSettings};
 
 pub use layout::{Layout, Panel};
 pub use rig::{MultiviewRig, ViewTarget, Views};
@@ -100,7 +100,7 @@ impl MultiViewOptions {
 pub struct MultiView {
     scene: Scene,
     options: MultiViewOptions,
-    settings: Settings,
+    settings: SceneSettings,
     view: Viewport,
     seed: u64,
 }
@@ -123,12 +123,12 @@ impl MultiView {
         let across = if options.show == Show::SideBySide { options.views.max(1) } else { 1 };
         settings.check()?;
         let width = settings.width;
-        let settings = Settings { width: width.saturating_mul(across), ..settings };
+        let settings = SceneSettings { width: width.saturating_mul(across), ..settings };
         settings.check().map_err(|_| LoadError::Setting {
             setting: "size",
             message: format!("{across} views of {width} pixels side by side are wider than an image can be: make each smaller, or show them otherwise"),
         })?;
-        let settings = Settings { focus: options.focus.or(settings.focus), ..settings };
+        let settings = SceneSettings { focus: options.focus.or(settings.focus), ..settings };
         let view = Viewport::new(settings.width / across, settings.height);
         let refused = |message: &str| LoadError::Setting { setting: "size", message: message.to_owned() };
         let view = view.ok_or_else(|| refused(crate::job::IMAGE_SIZE))?;
@@ -197,7 +197,7 @@ impl DrawsScene for MultiView {
         &self.scene
     }
 
-    fn settings(&self) -> &Settings {
+    fn settings(&self) -> &SceneSettings {
         &self.settings
     }
 

@@ -27,7 +27,7 @@ use crate::error::LoadError;
 use crate::job::{
     Drawn, Draws, Fact, Flag, Flags, Job, JobError, JobOptions, JobRequest, Need, OptionSource, facts,
 };
-use crate::scene::Settings;
+use crate::scene::SceneSettings;
 
 /// Kind of points.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -98,7 +98,7 @@ impl Default for PointOptions {
 /// The job, its settings and its seed.
 struct Sampling {
     options: PointOptions,
-    settings: Settings,
+    settings: SceneSettings,
     seed: u64,
 }
 
@@ -156,9 +156,9 @@ pub(crate) fn job(options: &OptionSource, request: &JobRequest<'_>) -> Result<Bo
             "these bring samples of their own: only `points=volume` takes --samples".to_owned(),
         );
     }
-    let usual = Settings { width: 512, height: 512, samples: 4, ..Settings::default() };
+    let usual = SceneSettings { width: 512, height: 512, samples: 4, ..SceneSettings::default() };
     let settings = usual.with(request.overrides)?;
-    let settings = Settings { table: options.points.samples().to_owned(), ..settings };
+    let settings = SceneSettings { table: options.points.samples().to_owned(), ..settings };
     if settings.width != settings.height {
         return refused("size", "width and height have to be equal, as the unit square is drawn".to_owned());
     }
@@ -371,7 +371,7 @@ impl Draws for Sampling {
     /// Frame number, which seeds the points.
     type Input = u32;
 
-    fn settings(&self) -> &Settings {
+    fn settings(&self) -> &SceneSettings {
         &self.settings
     }
 

@@ -8,7 +8,7 @@ use pipeline::LensShape;
 use serde::{Deserialize, Serialize};
 
 use super::camera::{Aim, DEFAULT_FOV_DEG, Frustum, LookAt, Place, Rig, SceneCamera, Side};
-use super::settings::Settings;
+use super::settings::SceneSettings;
 use super::track::{Interpolation, Track};
 use crate::bounded;
 use crate::error::{LoadError, Source};
@@ -296,7 +296,7 @@ impl CameraSpec {
     ///
     /// # Errors
     /// The wrong field: two kinds of motion, invalid keys, or a field that scenes do not use.
-    pub(crate) fn scene_camera(&self, settings: &Settings) -> Result<SceneCamera, Wrong> {
+    pub(crate) fn scene_camera(&self, settings: &SceneSettings) -> Result<SceneCamera, Wrong> {
         let unused = [
             ("end_up", self.end_up.is_some()),
             ("seed", self.seed.is_some()),
@@ -314,7 +314,7 @@ impl CameraSpec {
         Ok(SceneCamera { rig, view: self.view(), near: self.near })
     }
 
-    fn sight(&self, position: [f64; 3], settings: &Settings) -> Result<LookAt, Wrong> {
+    fn sight(&self, position: [f64; 3], settings: &SceneSettings) -> Result<LookAt, Wrong> {
         let end_s = f64::from(settings.frames.end) / settings.frame_rate_hz;
         let position = self.path("end_position", (position, self.end_position), end_s, |key| key.position)?;
         let aim = match (self.target, self.direction) {
@@ -418,7 +418,7 @@ mod tests {
     #[test]
     fn keys_that_make_no_track_are_named_as_keys() {
         let spec = "position: (0, 0, 3), target: (0, 0, 0), keyframes: [(time_s: 1), (time_s: 0.5)]";
-        let wrong = parse(&format!("({spec})")).unwrap().scene_camera(&Settings::default());
+        let wrong = parse(&format!("({spec})")).unwrap().scene_camera(&SceneSettings::default());
         assert_eq!(wrong.err().map(|(place, _)| place), Some("keyframes"));
     }
 

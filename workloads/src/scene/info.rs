@@ -12,7 +12,7 @@ use super::camera::{Frustum, Rig};
 use super::camera_used::{CameraUsed, field_of_view};
 use super::frame::FrameError;
 use super::graph::movers;
-use super::settings::Settings;
+use super::settings::SceneSettings;
 use crate::material::Alpha;
 
 /// Summary of a scene. Lengths are in scene units; bounds are those of the first requested frame, while its
@@ -133,7 +133,7 @@ pub struct LightInfo {
 
 /// Render settings.
 #[derive(Clone, Debug, Serialize)]
-#[allow(missing_docs, reason = "the names say it, documented at `Settings`")]
+#[allow(missing_docs, reason = "the names say it, documented at `SceneSettings`")]
 pub struct SettingsInfo {
     pub width: u32,
     pub height: u32,
@@ -146,7 +146,7 @@ pub struct SettingsInfo {
 
 impl SettingsInfo {
     /// `settings`, without the lens, which belongs to the camera.
-    pub fn new(settings: &Settings) -> Self {
+    pub fn new(settings: &SceneSettings) -> Self {
         Self {
             width: settings.width,
             height: settings.height,

@@ -26,7 +26,7 @@ pub use info::{
 pub(crate) use measure::lens_leaves_view;
 pub(crate) use mesh::Bounds;
 pub use mesh::{Influences, Instance, Mesh, MorphTarget, Normals, Skin};
-pub use settings::{Overrides, Settings};
+pub use settings::{Overrides, SceneSettings};
 pub use track::{Instant, Interpolation, Track};
 pub(crate) use track::{rotation, unit_quat};
 
@@ -58,7 +58,7 @@ pub struct Scene {
     camera_source: CameraSource,
     light: Light,
     background: Vec3,
-    settings: Settings,
+    settings: SceneSettings,
     /// Frames that the scene renders where nothing else is requested. What is placed once for all frames (a
     /// fitted camera, the lamp over its shoulder, the centre that a lens is focused on) is placed for these,
     /// so that a frame looks the same whichever frames are rendered with it.
@@ -313,7 +313,7 @@ impl Scene {
     }
 
     /// Size of the image, sampling, time and lens.
-    pub fn settings(&self) -> &Settings {
+    pub fn settings(&self) -> &SceneSettings {
         &self.settings
     }
 
@@ -377,7 +377,7 @@ pub struct Parts {
     /// Linear RGB radiance of the background.
     pub background: Vec3,
     /// Size of the image, sampling, time and lens.
-    pub settings: Settings,
+    pub settings: SceneSettings,
     /// Warnings of the importer.
     pub warnings: Vec<Warning>,
 }
@@ -396,7 +396,7 @@ impl Parts {
             cameras: Vec::new(),
             light: Light::default(),
             background: DEFAULT_BACKGROUND,
-            settings: Settings::default(),
+            settings: SceneSettings::default(),
             warnings: Vec::new(),
         }
     }

@@ -8,7 +8,7 @@ use crate::error::LoadError;
 
 /// Size of the image, sampling, time and lens.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Settings {
+pub struct SceneSettings {
     /// Width of the image in pixels, 1 to 16384.
     pub width: u32,
     /// Height of the image in pixels, 1 to 16384.
@@ -30,7 +30,7 @@ pub struct Settings {
     pub table: String,
 }
 
-impl Default for Settings {
+impl Default for SceneSettings {
     fn default() -> Self {
         Self {
             width: 1280,
@@ -46,7 +46,7 @@ impl Default for Settings {
     }
 }
 
-/// Changes to [`Settings`], clip and camera; `None` keeps the scene's value.
+/// Changes to [`SceneSettings`], clip and camera; `None` keeps the scene's value.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Overrides {
@@ -76,7 +76,7 @@ pub struct Overrides {
 /// The largest frame number: times stay exact to well below a microsecond.
 pub(super) const LAST_FRAME: u32 = 10_000_000;
 
-impl Settings {
+impl SceneSettings {
     /// These settings with the changes in `overrides`.
     ///
     /// # Errors
@@ -169,7 +169,7 @@ mod tests {
             ("focus", Overrides { focus: Some(0.0), lens_radius: Some(0.1), ..none() }),
         ];
         for (name, overrides) in bad {
-            let error = Settings::default().with(&overrides).unwrap_err();
+            let error = SceneSettings::default().with(&overrides).unwrap_err();
             assert!(error.is_usage());
             assert!(error.to_string().contains(name), "{error}");
         }
@@ -177,7 +177,7 @@ mod tests {
 
     #[test]
     fn a_pinhole_on_request_drops_the_focus() {
-        let lens = Settings { lens_radius: 0.1, focus: Some(3.0), ..Settings::default() };
+        let lens = SceneSettings { lens_radius: 0.1, focus: Some(3.0), ..SceneSettings::default() };
         let pinhole = lens.with(&Overrides { lens_radius: Some(0.0), ..Overrides::default() }).unwrap();
         assert_eq!((pinhole.lens_radius, pinhole.focus), (0.0, None));
     }

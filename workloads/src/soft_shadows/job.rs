@@ -19,8 +19,8 @@ use crate::job::{
 };
 use crate::material::{Alpha, Material};
 use crate::scene::{
-    self, Frame, FrameMesh, Graph, Local, Motion, Node, Overrides, Parts, Rig, Scene, SceneCamera, Settings,
-    Spin, Trs, tan_half,
+    self, Frame, FrameMesh, Graph, Local, Motion, Node, Overrides, Parts, Rig, Scene, SceneCamera,
+    SceneSettings, Spin, Trs, tan_half,
 };
 use crate::shapes;
 
@@ -242,8 +242,14 @@ pub fn default_scene() -> Result<Scene, LoadError> {
         near: None,
     };
     parts.background = Vec3::new(0.32, 0.40, 0.52);
-    parts.settings =
-        Settings { width: 320, height: 180, samples: 64, frames: 0..4, shutter: 0.5, ..Settings::default() };
+    parts.settings = SceneSettings {
+        width: 320,
+        height: 180,
+        samples: 64,
+        frames: 0..4,
+        shutter: 0.5,
+        ..SceneSettings::default()
+    };
     Scene::new(parts)
 }
 

@@ -7,7 +7,7 @@ use glam::{DVec2, DVec3};
 use pipeline::random::SplitMix;
 use workloads::caustics::generator::{Ocean, Wave};
 use workloads::caustics::{
-    Beam, BeamMethod, DrawnLight, Eye, Floor, Squares, crossing, draw, error, receivers,
+    Beam, BeamMethod, Eye, Floor, LightQuantity, Squares, crossing, draw, error, receivers,
 };
 
 const DEPTH: f64 = 4.0;
@@ -34,7 +34,7 @@ fn flux_w(beams: &[Beam]) -> f64 {
 #[test]
 fn every_method_draws_the_same_image_with_moving_triangles_cheapest() {
     for (slope, light) in
-        [(0.15, DrawnLight::Volume), (0.3, DrawnLight::Floor(FLOOR)), (0.6, DrawnLight::Volume)]
+        [(0.15, LightQuantity::Volume), (0.3, LightQuantity::Floor(FLOOR)), (0.6, LightQuantity::Volume)]
     {
         let (beams, eye) = (ocean(10, slope).beams(0.0), aside([84, 56]));
         let ours = draw(&beams, &eye, BeamMethod::Moving, Some(light));
@@ -62,20 +62,20 @@ fn crossed_sides_make_the_uncut_bound_lose_light() {
     let squares = Squares { eye: &eye, side_px: 8 };
     let known = squares.on_floor(&flat, 0.0, &floor, [600, 1]);
     let difference = |ocean: &Ocean| {
-        let image = draw(&ocean.beams(0.0), &eye, BeamMethod::Moving, Some(DrawnLight::Floor(floor)));
+        let image = draw(&ocean.beams(0.0), &eye, BeamMethod::Moving, Some(LightQuantity::Floor(floor)));
         error(&squares.of_image(&image.light), &known)
     };
     let beams = pleated.beams(0.0);
     assert!(crossing(&beams) > 0.05 && crossing(&flat.beams(0.0)) < 0.01, "{}", crossing(&beams));
     let (crossed, straight) = (difference(&pleated), difference(&flat));
     assert!((crossed - straight).abs() < 0.03, "{crossed} {straight}");
-    let ours = draw(&beams, &side, BeamMethod::Moving, Some(DrawnLight::Volume));
+    let ours = draw(&beams, &side, BeamMethod::Moving, Some(LightQuantity::Volume));
     for method in [BeamMethod::Refined, BeamMethod::Hull, BeamMethod::Prism] {
-        let theirs = draw(&beams, &side, method, Some(DrawnLight::Volume));
+        let theirs = draw(&beams, &side, method, Some(LightQuantity::Volume));
         assert_eq!(theirs.light, ours.light, "{method:?}");
     }
     assert_eq!(receivers(&beams, &eye, BeamMethod::Moving, &floor).missed, 0);
-    let uncut = draw(&beams, &side, BeamMethod::Uncut, Some(DrawnLight::Volume));
+    let uncut = draw(&beams, &side, BeamMethod::Uncut, Some(LightQuantity::Volume));
     assert!(uncut.light.iter().sum::<f64>() < (1.0 - 1e-4) * ours.light.iter().sum::<f64>());
 }
 
@@ -84,7 +84,7 @@ fn drawing_does_not_depend_on_threads() {
     let (beams, eye) = (ocean(10, 0.3).beams(0.2), aside([100, 70]));
     let with = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        pool.install(|| draw(&beams, &eye, BeamMethod::Refined, Some(DrawnLight::Volume)))
+        pool.install(|| draw(&beams, &eye, BeamMethod::Refined, Some(LightQuantity::Volume)))
     };
     assert_eq!(with(1), with(3));
 }
@@ -110,12 +110,12 @@ fn energy_is_kept() {
         let eye = above(16.0, 480);
         let pixel_m2 = (eye.scale_px() * eye.scale_px()).recip();
         for method in [BeamMethod::Moving, BeamMethod::Prism] {
-            let floor = draw(&beams, &eye, method, Some(DrawnLight::Floor(FLOOR)));
+            let floor = draw(&beams, &eye, method, Some(LightQuantity::Floor(FLOOR)));
             let arrives = floor.light.iter().sum::<f64>() * pixel_m2;
             assert!((arrives / flux_w(&beams) - 1.0).abs() < 0.01, "{slope}: {}", arrives / flux_w(&beams));
         }
         let volume =
-            draw(&beams, &eye, BeamMethod::Moving, Some(DrawnLight::Volume)).light.iter().sum::<f64>()
+            draw(&beams, &eye, BeamMethod::Moving, Some(LightQuantity::Volume)).light.iter().sum::<f64>()
                 * pixel_m2;
         let path = |beam: &Beam| beam.flux_w * (0..3).map(|k| beam.path(k).length()).sum::<f64>() / 3.0;
         let known: f64 = beams.iter().map(path).sum();
@@ -163,7 +163,7 @@ fn photons_on_the_floor_follow_the_image() {
         .collect();
     let (bins, fine) = (16, 48);
     let eye = above(12.0, bins * fine);
-    let image = draw(&beams, &eye, BeamMethod::Moving, Some(DrawnLight::Floor(FLOOR)));
+    let image = draw(&beams, &eye, BeamMethod::Moving, Some(LightQuantity::Floor(FLOOR)));
     let photons = 40_000;
     let per_photon = flux_w(&beams) / f64::from(photons);
     let pixel_m2 = (eye.scale_px() * eye.scale_px()).recip();
@@ -203,7 +203,7 @@ fn photon_paths_follow_the_image_of_the_volume() {
         .collect();
     let (bins, fine) = ([24_u32, 16], 20);
     let eye = aside(bins.map(|bins| bins * fine));
-    let image = draw(&beams, &eye, BeamMethod::Moving, Some(DrawnLight::Volume));
+    let image = draw(&beams, &eye, BeamMethod::Moving, Some(LightQuantity::Volume));
     // Random positions on rays, each of which represents a part of the path.
     let places = 200_000;
     let mut random = Photons(SplitMix::new(4));
@@ -242,7 +242,7 @@ fn one_wave_agrees_with_the_closed_form() {
         let mut water = Ocean { overshoot: 0.01, ..Ocean::new(300, 3.0, depth_m, [1.0, 0.1], 1) };
         (water.waves, water.sun) = (vec![wave], DVec3::NEG_Y);
         let eye = above(1.0, 200);
-        let floor = DrawnLight::Floor(Floor { height_m: -depth_m });
+        let floor = LightQuantity::Floor(Floor { height_m: -depth_m });
         let image = draw(&water.beams(0.0), &eye, BeamMethod::Moving, Some(floor));
         let enters = 1.0 - (0.33_f64 / 2.33).powi(2);
         let (mut difference, mut sum) = (0.0, 0.0);
@@ -290,7 +290,8 @@ fn a_ball_lens_agrees_with_the_closed_form() {
         .map(|beam| Beam { open: beam.open.map(turn), close: beam.close.map(turn), ..beam })
         .collect();
     let eye = above(2.0, 240);
-    let image = draw(&beams, &eye, BeamMethod::Moving, Some(DrawnLight::Floor(Floor { height_m: -reach_m })));
+    let image =
+        draw(&beams, &eye, BeamMethod::Moving, Some(LightQuantity::Floor(Floor { height_m: -reach_m })));
     let lands = |h: f64| {
         let (i, r) = (h.asin(), (h / 1.5).asin());
         let turned = 2.0 * (i - r);

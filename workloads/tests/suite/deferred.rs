@@ -5,7 +5,7 @@ use glam::{DVec3, Vec3};
 use pipeline::{FrameReport, Gpu};
 use workloads::deferred::{Deferred, DeferredOptions, LightPass, LightingMethod, LightingRate, NormalFormat};
 use workloads::job::{Drawn, Job};
-use workloads::scene::{Local, Node, Parts, Rig, Scene, SceneCamera, Settings, Trs};
+use workloads::scene::{Local, Node, Parts, Rig, Scene, SceneCamera, SceneSettings, Trs};
 use workloads::{Alpha, Material, Overrides, shapes};
 
 use crate::common::spec;
@@ -185,7 +185,7 @@ fn pane(velocity: DVec3) -> Scene {
     }
     let rig = Rig::look_at(DVec3::new(0.6, 0.4, 5.0), DVec3::ZERO);
     parts.camera = SceneCamera { rig, ..SceneCamera::default() };
-    parts.settings = Settings::default();
+    parts.settings = SceneSettings::default();
     Scene::new(parts).unwrap()
 }
 

@@ -2,7 +2,7 @@
 //! module; a row of the list of claims is a function.
 //!
 //! ```text
-//! settings -> scenes -> Stage (pipeline, clock, watts) -> TracedRun (pacing, surroundings, recorder, analysis) -> Row, Figure
+//! settings -> scenes -> Stage (pipeline, clock, watts) -> TracedRun (pacing, surroundings, recorder, analysis) -> ClaimRow, Figure
 //! ```
 //!
 //! Inputs come from the papers only. A committed file of settings for each paper has what it states and what
@@ -25,8 +25,8 @@ use serde::Serialize;
 use settings::Form;
 
 pub use report::{Figure, PaperReport};
-pub use row::{Band, ClaimRow, RowNumber, TriedCase, Turn, Verdict};
-pub use settings::{About, Listed, RowKind, SettingsOrigin};
+pub use row::{Band, ClaimRow, NamedValue, SettingCase, Turn, Verdict};
+pub use settings::{About, AgreementKind, Listed, SettingsOrigin};
 
 /// Papers with reproduced claims.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]

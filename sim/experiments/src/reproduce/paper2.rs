@@ -11,7 +11,7 @@ use workloads::Overrides;
 use workloads::deferred::{Deferred, DeferredOptions, LightPass, NormalFormat};
 
 use super::report::{POWER, TIME, line};
-use super::row::{Cases, ClaimRow, RowNumber, Verdict, With, numbers, one_at_a_time};
+use super::row::{Cases, ClaimRow, NamedValue, Verdict, With, numbers, one_at_a_time};
 use super::settings::{
     About, Form, RowSetting, SettingsOrigin, load, paper_settings, reduced, row_settings, settings_group,
 };
@@ -43,24 +43,24 @@ pub(super) fn rows(
     }
     if options.wants("II-2") {
         let frames = pc.pc_animation(*settings.work.pc_frames.get(form), progress)?;
-        let recording = TracedRun::new(&pc, &looped(&frames, recorded), pc.capped()?, circumstances)?;
+        let run = TracedRun::new(&pc, &looped(&frames, recorded), pc.capped()?, circumstances)?;
         let with = With { settings: &settings.ii_2, form, sha256: &origin.sha256, shared_less: less };
-        done.push(inverses(&with, &recording, &recording.find(MARKED)?));
+        done.push(inverses(&with, &run, &run.find(MARKED)?));
     }
     Ok((origin, done))
 }
 
 /// Recorded frames.
-fn ran(recording: &TracedRun, found: usize) -> Vec<RowNumber> {
+fn ran(run: &TracedRun, found: usize) -> Vec<NamedValue> {
     numbers([
-        ("frames_drawn", recording.truth.frames.len() as f64),
-        ("samples_recorded", recording.trace.samples() as f64),
+        ("frames_drawn", run.truth.frames.len() as f64),
+        ("samples_recorded", run.trace.samples() as f64),
         ("frames_found", found as f64),
     ])
 }
 
 /// II-2: the mean of inverses is not the inverse of the mean.
-fn inverses(with: &With<'_, Inverses>, recording: &TracedRun, frames: &Frames) -> Done {
+fn inverses(with: &With<'_, Inverses>, run: &TracedRun, frames: &Frames) -> Done {
     let same = *with.settings.same.get(with.form);
     let per_pixel: Vec<f64> = frames.found.iter().map(|frame| frame.energy_j / PIXELS).collect();
     let count = per_pixel.len() as f64;
@@ -68,7 +68,7 @@ fn inverses(with: &With<'_, Inverses>, recording: &TracedRun, frames: &Frames) -
     let right = count / per_pixel.iter().sum::<f64>();
     // The right one is that of the whole animation: all pixels over all joules.
     let from_s = frames.found.first().map_or(0.0, |frame| frame.start_s);
-    let whole_j = PowerIntegral::new(&recording.trace).energy_j(from_s, frames.end_s);
+    let whole_j = PowerIntegral::new(&run.trace).energy_j(from_s, frames.end_s);
     let whole = PIXELS * count / whole_j;
     let ours = format!(
         "mean of pixels/J {:.4} Mpixel/J (WRONG), 1 / mean of J/pixel {:.4} Mpixel/J, whole animation {:.4} Mpixel/J",
@@ -87,7 +87,7 @@ fn inverses(with: &With<'_, Inverses>, recording: &TracedRun, frames: &Frames) -
         ("whole_animation_pixels_per_J", whole),
     ]);
     let made = with.row(&with.settings.about, (ours, Verdict::of(holds), note));
-    Done::bare(ClaimRow { numbers: facts, ran: ran(recording, frames.found.len()), ..made })
+    Done::bare(ClaimRow { numbers: facts, ran: ran(run, frames.found.len()), ..made })
 }
 
 paper_settings!(Paper::Two, "paper2.ron" {
@@ -197,7 +197,7 @@ impl Split {
 
 /// Frames of a point, their recording and their energies.
 struct Measured {
-    recording: TracedRun,
+    run: TracedRun,
     /// Ends of the G-buffer and the lighting pass of each drawn frame, s from its start.
     ends_s: Vec<[f64; 2]>,
     split: Split,
@@ -222,18 +222,18 @@ impl Bench<'_> {
         let frames = frames.collect::<Result<Vec<JobFrame>, RunError>>()?;
         let shown: Vec<&FramePower> =
             frames.iter().map(|frame| &frame.power).cycle().take(self.recorded).collect();
-        let recording = TracedRun::new(self.pc, &shown, self.pc.capped()?, self.circumstances)?;
-        let split = self.split(&frames, &recording).scaled(1.0 / point.pixels());
+        let run = TracedRun::new(self.pc, &shown, self.pc.capped()?, self.circumstances)?;
+        let split = self.split(&frames, &run).scaled(1.0 / point.pixels());
         let facts = frames.iter().flat_map(|frame| &frame.drawn.facts);
         let invocations =
             facts.filter(|fact| fact.name == "lighting_invocations").map(|fact| fact.value).sum();
-        Ok(Measured { ends_s: frames.iter().map(ends_s).collect(), recording, split, invocations })
+        Ok(Measured { ends_s: frames.iter().map(ends_s).collect(), run, split, invocations })
     }
 
     /// Mean energies of the recorded frames.
-    fn split(&self, frames: &[JobFrame], recording: &TracedRun) -> Split {
+    fn split(&self, frames: &[JobFrame], run: &TracedRun) -> Split {
         let idle_w = self.pc.platform.idle_w.value();
-        let (truth, stamps) = (&recording.truth, PowerIntegral::new(&recording.trace));
+        let (truth, stamps) = (&run.truth, PowerIntegral::new(&run.trace));
         let mut split = Split::default();
         for (paced, frame) in truth.frames.iter().zip(frames.iter().cycle()) {
             let above = |joules: f64, from_s: f64, to_s: f64| joules - idle_w * (to_s - from_s);
@@ -346,10 +346,10 @@ fn row(with: &With<'_, Passes>, bench: &Bench<'_>, progress: &Progress) -> Resul
     let made = with.banded(&row.about, ours(&base.split, row, form), band);
     let largest = errors.iter().copied().fold(base.split.error(), f64::max);
     let ran = numbers([
-        ("frames_recorded_per_case", base.recording.truth.frames.len() as f64),
+        ("frames_recorded_per_case", base.run.truth.frames.len() as f64),
         ("cases", errors.len() as f64),
         ("lighting_invocations", base.invocations + invocations),
-        ("samples_recorded", base.recording.trace.samples() as f64),
+        ("samples_recorded", base.run.trace.samples() as f64),
     ]);
     let figure = figure(&base, bench.pc.platform.idle_w.value());
     Ok(Done { row: ClaimRow { numbers: facts(&base.split, largest), ran, ..made }, figures: vec![figure] })
@@ -366,7 +366,7 @@ fn ours(split: &Split, row: &Passes, form: Form) -> String {
     )
 }
 
-fn facts(split: &Split, largest: f64) -> Vec<RowNumber> {
+fn facts(split: &Split, largest: f64) -> Vec<NamedValue> {
     numbers([
         ("frame_nJ_per_pixel", 1e9 * split.frame),
         ("g_buffer_nJ_per_pixel", 1e9 * split.g_buffer),
@@ -382,15 +382,15 @@ fn facts(split: &Split, largest: f64) -> Vec<RowNumber> {
 
 /// Figure 1: measured power over two frames, idle taken off.
 fn figure(measured: &Measured, idle_w: f64) -> Figure {
-    let (recording, ends_s) = (&measured.recording, &measured.ends_s);
-    let middle = recording.truth.frames.len() / 2;
-    let origin_s = recording.truth.frames[middle].start_s;
+    let (run, ends_s) = (&measured.run, &measured.ends_s);
+    let middle = run.truth.frames.len() / 2;
+    let origin_s = run.truth.frames[middle].start_s;
     let above = |name: &str, from_s: f64, to_s: f64| -> Series {
-        let points = recording.points(from_s, to_s).into_iter();
+        let points = run.points(from_s, to_s).into_iter();
         line(name, points.map(|(time_s, watts)| (from_s - origin_s + time_s, watts - idle_w)).collect())
     };
     let of_frame = |place: usize| {
-        let paced = &recording.truth.frames[place];
+        let paced = &run.truth.frames[place];
         let [first, second] = ends_s[place % ends_s.len()].map(|end_s| paced.start_s + end_s);
         let of = if place == middle { "" } else { " of the next frame" };
         [

@@ -317,19 +317,21 @@ pub(super) fn by_place(values: &[f64]) -> Vec<(f64, f64)> {
 #[cfg(test)]
 mod tests {
     use super::super::row::tests::row;
-    use super::super::settings::RowKind;
+    use super::super::settings::AgreementKind;
     use super::*;
 
-    fn done(id: &'static str, kind: RowKind, verdict: Verdict) -> Done {
+    fn done(id: &'static str, kind: AgreementKind, verdict: Verdict) -> Done {
         let axes = [("x", ""), ("y", "W")];
         let figure = Figure::lines("III_fig1", "t", "s", axes, Vec::new());
-        let figures = if kind == RowKind::Order { vec![figure] } else { Vec::new() };
+        let figures = if kind == AgreementKind::Order { vec![figure] } else { Vec::new() };
         Done { row: row(id, kind, verdict), figures }
     }
 
     fn report(verdict: Verdict) -> PaperReport {
-        let rows =
-            vec![done("III-8", RowKind::Equality, verdict), done("III-9", RowKind::Order, Verdict::Differs)];
+        let rows = vec![
+            done("III-8", AgreementKind::Equality, verdict),
+            done("III-9", AgreementKind::Order, Verdict::Differs),
+        ];
         let origin =
             SettingsOrigin { file: "paper.ron".to_owned(), sha256: "abc".to_owned(), committed: false };
         PaperReport::new(Paper::Three, Form::Quick, origin, rows)

@@ -4,7 +4,7 @@
 use run::RunError;
 use serde::Serialize;
 
-use super::settings::{About, Form, Listed, RowKind, listed, reduced};
+use super::settings::{About, AgreementKind, Form, Listed, listed, reduced};
 use crate::study::Ran;
 
 /// A row of the list of claims.
@@ -28,9 +28,9 @@ pub struct ClaimRow {
     /// Why it differs, where the condition changes, or which part is missing.
     pub note: String,
     /// Amount of work: draws, passes, fragments, samples. A row with a 0 shows nothing.
-    pub ran: Vec<RowNumber>,
+    pub ran: Vec<NamedValue>,
     /// The numbers behind `ours`, by name.
-    pub numbers: Vec<RowNumber>,
+    pub numbers: Vec<NamedValue>,
     /// Settings of the row.
     pub settings: Vec<Listed>,
     /// SHA-256 of the file of these settings.
@@ -43,14 +43,14 @@ pub struct ClaimRow {
 
 /// A computed number.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct RowNumber {
+pub struct NamedValue {
     /// Name of the number, with its unit.
     pub name: &'static str,
     /// Value of the number.
     pub value: f64,
 }
 
-impl RowNumber {
+impl NamedValue {
     /// Whether the count is 0.
     fn is_nothing(&self) -> bool {
         self.value.is_nan() || self.value <= 0.0
@@ -58,12 +58,12 @@ impl RowNumber {
 }
 
 /// Numbers from names and values.
-pub(super) fn numbers<const N: usize>(pairs: [(&'static str, f64); N]) -> Vec<RowNumber> {
-    pairs.into_iter().map(|(name, value)| RowNumber { name, value }).collect()
+pub(super) fn numbers<const N: usize>(pairs: [(&'static str, f64); N]) -> Vec<NamedValue> {
+    pairs.into_iter().map(|(name, value)| NamedValue { name, value }).collect()
 }
 
 /// Passes, draws and fragments that ran.
-pub(super) fn ran(of: &Ran) -> Vec<RowNumber> {
+pub(super) fn ran(of: &Ran) -> Vec<NamedValue> {
     let Ran { passes, draws, fragments } = *of;
     numbers([("passes", passes as f64), ("draws", draws as f64), ("fragments", fragments as f64)])
 }
@@ -110,12 +110,12 @@ impl<S: Serialize> With<'_, S> {
 impl ClaimRow {
     /// Whether a required amount of work is 0.
     pub fn ran_nothing(&self) -> bool {
-        self.ran.is_empty() || self.ran.iter().any(RowNumber::is_nothing)
+        self.ran.is_empty() || self.ran.iter().any(NamedValue::is_nothing)
     }
 
     /// Whether the row is an equality that does not hold.
     pub fn is_unequal(&self) -> bool {
-        self.about.kind == RowKind::Equality && self.verdict != Verdict::Holds
+        self.about.kind == AgreementKind::Equality && self.verdict != Verdict::Holds
     }
 
     /// Whether the row must hold and does not, or did no work.
@@ -164,7 +164,7 @@ impl ClaimRow {
 
 /// Result of one combination of settings.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct TriedCase {
+pub struct SettingCase {
     /// The varied setting; empty if all have their given values.
     pub setting: String,
     /// Value of the varied setting.
@@ -206,7 +206,7 @@ pub struct Band {
     /// Where the condition changes.
     pub turns: Vec<Turn>,
     /// Every case.
-    pub cases: Vec<TriedCase>,
+    pub cases: Vec<SettingCase>,
 }
 
 /// Cases as they are computed.
@@ -214,7 +214,7 @@ pub struct Band {
 pub(super) struct Cases {
     of: &'static str,
     varied: &'static str,
-    cases: Vec<TriedCase>,
+    cases: Vec<SettingCase>,
     turns: Vec<Turn>,
 }
 
@@ -232,7 +232,7 @@ impl Cases {
         values: impl IntoIterator<Item = (V, f64, bool)>,
     ) -> &mut Self {
         let first = self.cases.len();
-        self.cases.extend(values.into_iter().map(|(value, number, holds)| TriedCase {
+        self.cases.extend(values.into_iter().map(|(value, number, holds)| SettingCase {
             setting: setting.to_owned(),
             value: value.to_string(),
             number,
@@ -265,8 +265,8 @@ impl Cases {
         let nothing = || RunError::setting(format!("{}: the settings have no value to try", self.of));
         let (min, max) = least_and_most.ok_or_else(nothing)?;
         let mut counted = false;
-        let mut first = |case: &&TriedCase| !case.base || !std::mem::replace(&mut counted, true);
-        let different: Vec<&TriedCase> = self.cases.iter().filter(&mut first).collect();
+        let mut first = |case: &&SettingCase| !case.base || !std::mem::replace(&mut counted, true);
+        let different: Vec<&SettingCase> = self.cases.iter().filter(&mut first).collect();
         let (tried, held) = (different.len(), different.iter().filter(|case| case.holds).count());
         let Self { of, varied, cases, turns } = self;
         Ok(Band { of, varied, min, max, tried, full, held, turns, cases })
@@ -358,7 +358,7 @@ impl Verdict {
 pub(super) mod tests {
     use super::*;
 
-    pub fn row(id: &str, kind: RowKind, verdict: Verdict) -> ClaimRow {
+    pub fn row(id: &str, kind: AgreementKind, verdict: Verdict) -> ClaimRow {
         let about = About {
             id: id.to_owned(),
             kind,
@@ -375,14 +375,15 @@ pub(super) mod tests {
     #[test]
     fn an_equality_that_does_not_hold_fails() {
         for verdict in [Verdict::Differs, Verdict::Depends, Verdict::NotYet] {
-            assert!(row("X-1", RowKind::Equality, verdict).fails());
+            assert!(row("X-1", AgreementKind::Equality, verdict).fails());
             assert!(
-                !row("X-1", RowKind::Number, verdict).fails() && !row("X-1", RowKind::Order, verdict).fails()
+                !row("X-1", AgreementKind::Number, verdict).fails()
+                    && !row("X-1", AgreementKind::Order, verdict).fails()
             );
         }
-        assert!(!row("X-1", RowKind::Equality, Verdict::Holds).fails());
+        assert!(!row("X-1", AgreementKind::Equality, Verdict::Holds).fails());
         assert_eq!(
-            serde_json::to_value(row("X-1", RowKind::Order, Verdict::NotYet)).unwrap()["verdict"],
+            serde_json::to_value(row("X-1", AgreementKind::Order, Verdict::NotYet)).unwrap()["verdict"],
             "not yet"
         );
     }
@@ -391,20 +392,20 @@ pub(super) mod tests {
     fn a_row_that_ran_nothing_fails_and_shows_nothing() {
         for ran in [Vec::new(), numbers([("draws", 3.0), ("fragments", 0.0)]), numbers([("draws", f64::NAN)])]
         {
-            let empty = ClaimRow { ran, ..row("X-1", RowKind::Order, Verdict::Holds) };
+            let empty = ClaimRow { ran, ..row("X-1", AgreementKind::Order, Verdict::Holds) };
             assert!(empty.fails());
             let judged = empty.judged();
             assert_eq!(judged.verdict, Verdict::Differs);
             assert!(judged.note.starts_with("nothing was run"), "{}", judged.note);
         }
-        let good = row("X-1", RowKind::Order, Verdict::Holds);
+        let good = row("X-1", AgreementKind::Order, Verdict::Holds);
         assert_eq!(good.clone().judged(), ClaimRow { verdict_text: "holds".to_owned(), ..good });
     }
 
     /// The quick form may omit the values at which a condition changes.
     #[test]
     fn a_quick_verdict_says_at_how_many_settings_it_was_reached() {
-        let quick = ClaimRow { form: Form::Quick, ..row("X-1", RowKind::Order, Verdict::Holds) };
+        let quick = ClaimRow { form: Form::Quick, ..row("X-1", AgreementKind::Order, Verdict::Holds) };
         assert_eq!(quick.clone().judged().verdict_text, "holds (quick form)");
         let mut cases = Cases::new("share", "tiles alone");
         cases.along("tiles", [(4, 0.5, true), (8, 0.2, true)]);
@@ -420,7 +421,7 @@ pub(super) mod tests {
     fn numbers_that_were_not_measured_are_left_out() {
         let some = ClaimRow {
             numbers: numbers([("n", 2.0), ("at_64", f64::NAN)]),
-            ..row("X-1", RowKind::Order, Verdict::Holds)
+            ..row("X-1", AgreementKind::Order, Verdict::Holds)
         };
         assert_eq!(some.judged().numbers, numbers([("n", 2.0)]));
     }

@@ -43,7 +43,7 @@ pub struct About {
     /// Name of the row in the list of claims.
     pub id: String,
     /// Kind of agreement.
-    pub kind: RowKind,
+    pub kind: AgreementKind,
     /// The claim, in full.
     pub claim: String,
     /// Statement of the paper, with the passage.
@@ -56,7 +56,7 @@ pub struct About {
 
 /// Kind of agreement that a row needs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
-pub enum RowKind {
+pub enum AgreementKind {
     /// An equality that holds exactly.
     Equality,
     /// A number with a tolerance.
@@ -65,7 +65,7 @@ pub enum RowKind {
     Order,
 }
 
-impl RowKind {
+impl AgreementKind {
     /// The letter of the list of claims.
     pub const fn letter(self) -> &'static str {
         match self {
@@ -76,7 +76,7 @@ impl RowKind {
     }
 }
 
-impl Serialize for RowKind {
+impl Serialize for AgreementKind {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         serializer.serialize_str(self.letter())
     }
@@ -418,7 +418,7 @@ mod tests {
         }
         let about = About {
             id: "X-1".to_owned(),
-            kind: RowKind::Order,
+            kind: AgreementKind::Order,
             claim: String::new(),
             paper: String::new(),
             holds_when: String::new(),

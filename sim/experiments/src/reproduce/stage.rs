@@ -18,9 +18,7 @@ use traces::Trace;
 use traces::device::{Device, DeviceSpec};
 use traces::energy::{self, FrameEnergy, PowerIntegral, Score, TOLERANCE_S, TrueFrame};
 use traces::frames::{FinderMethod, FinderOptions, Flag, Marks, Window, default_window, find_with};
-use workloads::scene::{
-    Frustum, Graph, Local, Node, Parts, Rig, SceneCamera, Settings as SceneSettings, Trs,
-};
+use workloads::scene::{Frustum, Graph, Local, Node, Parts, Rig, SceneCamera, SceneSettings, Trs};
 use workloads::{Job, LoadError, Material, Overrides, SampleChoice, Scene, shapes};
 
 /// GPU, platform and energies.

@@ -11,7 +11,7 @@ use run::{GpuSpec, RunError};
 
 /// Multiply-adds at one value of a family.
 #[derive(Clone, Debug, PartialEq)]
-pub struct TestTrial {
+pub struct FamilyCosts {
     /// The family.
     pub family: &'static str,
     /// The value of its parameter.
@@ -24,7 +24,7 @@ pub struct TestTrial {
 
 /// `auto` against the best fixed choice, at one value or over a whole family.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct TestChoice {
+pub struct AutoAgainstBest {
     /// The family.
     pub family: &'static str,
     /// The value of its parameter; `None` for all of them added up.
@@ -54,12 +54,12 @@ pub fn trial(
     size: Size,
     seed: u64,
     gpu: &GpuSpec,
-) -> Result<TestTrial, RunError> {
+) -> Result<FamilyCosts, RunError> {
     on_subject(family, value, size, seed, gpu, |subject| {
         let madds = |features| subject.counts(features).map(|counts| MethodWork::new(&counts).madds());
         let auto = madds(Features { auto: true, ..Features::ALL })?;
         let fixed = fixed(subject.camera.lens().is_some(), madds)?;
-        Ok(TestTrial { family: family.name, value, auto, fixed })
+        Ok(FamilyCosts { family: family.name, value, auto, fixed })
     })
 }
 
@@ -81,14 +81,14 @@ fn fixed<E>(lens: bool, madds: impl Fn(Features) -> Result<u64, E>) -> Result<Ve
     .collect()
 }
 
-impl TestChoice {
+impl AutoAgainstBest {
     /// Of one value.
-    pub fn of(trial: &TestTrial) -> Self {
+    pub fn of(trial: &FamilyCosts) -> Self {
         Self::new(trial.family, Some(trial.value), trial.auto, &trial.fixed)
     }
 
     /// Of all values of a family, one choice for all of them; `None` where there is none.
-    pub fn over(trials: &[TestTrial]) -> Option<Self> {
+    pub fn over(trials: &[FamilyCosts]) -> Option<Self> {
         let family = trials.first()?.family;
         let sum = |at: usize| trials.iter().map(|trial| trial.fixed[at]).sum();
         let fixed: Vec<u64> = (0..trials[0].fixed.len()).map(sum).collect();
@@ -113,18 +113,18 @@ impl TestChoice {
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Choices {
     /// Each family as a whole, one fixed choice for all of its values.
-    pub families: Vec<TestChoice>,
+    pub families: Vec<AutoAgainstBest>,
     /// Each value, with the best choice for it alone.
-    pub values: Vec<TestChoice>,
+    pub values: Vec<AutoAgainstBest>,
 }
 
 impl Choices {
     /// Of the trials, those of a family one after the other.
-    pub fn new(trials: &[TestTrial]) -> Self {
+    pub fn new(trials: &[FamilyCosts]) -> Self {
         let families = trials.chunk_by(|a, b| a.family == b.family);
         Self {
-            families: families.filter_map(TestChoice::over).collect(),
-            values: trials.iter().map(TestChoice::of).collect(),
+            families: families.filter_map(AutoAgainstBest::over).collect(),
+            values: trials.iter().map(AutoAgainstBest::of).collect(),
         }
     }
 
@@ -161,12 +161,12 @@ impl Choices {
     /// `auto` and every test on, over the best fixed choice: of each family as a whole, and at the value that
     /// is worst for it.
     pub(super) fn picture(&self, plot_style: &PlotStyle) -> Picture {
-        type Cost = fn(&TestChoice) -> f64;
+        type Cost = fn(&AutoAgainstBest) -> f64;
         let costs: [(&str, Cost); 2] = [
             ("auto", |choice| choice.over_best),
             ("all", |choice| choice.all_madds.max(1) as f64 / choice.best_madds.max(1) as f64),
         ];
-        let worst = |family: &TestChoice, cost: Cost| {
+        let worst = |family: &AutoAgainstBest, cost: Cost| {
             let values = self.values.iter().filter(|value| value.family == family.family);
             values.map(cost).reduce(f64::max)
         };
@@ -203,11 +203,11 @@ impl Choices {
     }
 }
 
-fn over(choices: &[TestChoice]) -> usize {
+fn over(choices: &[AutoAgainstBest]) -> usize {
     choices.iter().filter(|choice| choice.over_best > MAX_OVER_BEST).count()
 }
 
-fn worst(choices: &[TestChoice]) -> Option<&TestChoice> {
+fn worst(choices: &[AutoAgainstBest]) -> Option<&AutoAgainstBest> {
     choices.iter().max_by(|a, b| a.over_best.total_cmp(&b.over_best))
 }
 
@@ -218,8 +218,8 @@ mod tests {
 
     use super::*;
 
-    fn trial(value: f64, auto: u64, fixed: [u64; 2]) -> TestTrial {
-        TestTrial { family: "speed", value, auto, fixed: fixed.to_vec() }
+    fn trial(value: f64, auto: u64, fixed: [u64; 2]) -> FamilyCosts {
+        FamilyCosts { family: "speed", value, auto, fixed: fixed.to_vec() }
     }
 
     #[test]

@@ -130,7 +130,7 @@ pub struct Pairs {
 
 struct Pair {
     triangle: Triangle,
-    place: TilePlace,
+    place: TileAndCamera,
     truth: Option<Hulls>,
 }
 
@@ -185,7 +185,8 @@ impl Pairs {
             for tile in (0..here).filter(|tile| chosen(passed + tile, stride)) {
                 let [column, row] = [tile % across, tile / across].map(|step| step as u32);
                 let origin = [(rect.x0 + column) * side, (rect.y0 + row) * side];
-                let place = TilePlace::new(subject.viewport, projection.shear, projection.near, origin, side);
+                let place =
+                    TileAndCamera::new(subject.viewport, projection.shear, projection.near, origin, side);
                 let truth = Truth::new(triangle, &projection.shear, &place.tile, projection.near);
                 // The truth asks where a triangle is, not which face it shows; so must the tests.
                 let triangle = Triangle { faces: [true; 2], ..*triangle };
@@ -209,7 +210,7 @@ impl Pairs {
     }
 
     /// Intervals under `bound`.
-    pub fn bounded(&self, bound: impl Fn(&TilePlace, &Triangle) -> Option<Box5>) -> Intervals {
+    pub fn bounded(&self, bound: impl Fn(&TileAndCamera, &Triangle) -> Option<Box5>) -> Intervals {
         let mut sum = Intervals { pairs: self.pairs.len() as u64, ..Intervals::default() };
         let (mut volume, mut true_volume) = (0.0, 0.0);
         for pair in &self.pairs {
@@ -345,7 +346,7 @@ pub fn combinations() -> Vec<(String, Features)> {
 
 /// A tile with what the tests need to know of the camera.
 #[derive(Clone, Copy, Debug)]
-pub struct TilePlace {
+pub struct TileAndCamera {
     /// The tile.
     pub tile: TileRect,
     /// The lens.
@@ -354,7 +355,7 @@ pub struct TilePlace {
     pub near: f32,
 }
 
-impl TilePlace {
+impl TileAndCamera {
     /// The tile of `side_px` pixels whose first pixel is `origin`.
     pub fn new(viewport: Viewport, shear: Shear, near: f32, origin: [u32; 2], side_px: u32) -> Self {
         Self { tile: TileRect::new(viewport, origin, side_px), shear, near }

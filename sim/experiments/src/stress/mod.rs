@@ -9,7 +9,7 @@ pub mod choice;
 pub mod measure;
 pub mod truth;
 
-use choice::{Choices, TestTrial};
+use choice::{Choices, FamilyCosts};
 use measure::{METHODS, StressRow, TestMethod};
 use output::dir::SUMMARY;
 use output::plot::{
@@ -112,10 +112,10 @@ impl Study for StressChart {
             bar.inc();
             Ok((rows, trial))
         };
-        let measured: Vec<(Vec<StressRow>, Option<TestTrial>)> =
+        let measured: Vec<(Vec<StressRow>, Option<FamilyCosts>)> =
             cases.par_iter().map(measure).collect::<Result<_, RunError>>()?;
         let (rows, trials): (Vec<_>, Vec<_>) = measured.into_iter().unzip();
-        let trials: Vec<TestTrial> = trials.into_iter().flatten().collect();
+        let trials: Vec<FamilyCosts> = trials.into_iter().flatten().collect();
         let (rows, auto) = (rows.into_iter().flatten().collect(), Choices::new(&trials));
         Ok(Self { families: chosen, size, rows, auto })
     }

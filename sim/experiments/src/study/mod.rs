@@ -59,7 +59,7 @@ pub trait Study: Serialize + Sized {
     /// Draws its pictures.
     ///
     /// # Errors
-    /// Those of the folder.
+    /// Errors of the folder.
     fn draw(&self, to: &Gallery<'_>) -> Result<(), OutputError>;
 
     /// Tables, in the order in which they are printed.
@@ -106,7 +106,7 @@ impl Gallery<'_> {
     /// Writes a picture as `stem`.
     ///
     /// # Errors
-    /// Those of the folder.
+    /// Errors of the folder.
     pub fn add(&self, stem: &str, picture: &Picture) -> Result<(), OutputError> {
         picture.write(self.dir, stem)
     }
@@ -114,7 +114,7 @@ impl Gallery<'_> {
     /// Draws panels under a title and a line on what they show, and writes them as `stem`.
     ///
     /// # Errors
-    /// Those of the folder.
+    /// Errors of the folder.
     pub fn chart(&self, stem: &str, titles: [&str; 2], panels: Vec<ChartPanel>) -> Result<(), OutputError> {
         let [title, subject] = titles;
         self.add(stem, &Chart::new(title, subject, panels).picture(self.plot_style))
@@ -155,7 +155,7 @@ impl Done {
     /// Draws and writes what a study found into `dir`.
     ///
     /// # Errors
-    /// Those of the folder.
+    /// Errors of the folder.
     pub fn new<S: Study>(found: &S, dir: &OutDir, plot_style: &PlotStyle) -> Result<Self, OutputError> {
         let sheets = found.tables();
         write(found, &sheets, dir, plot_style)?;

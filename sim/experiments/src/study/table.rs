@@ -197,7 +197,7 @@ impl Sheet {
     /// Writes names and values as CSV.
     ///
     /// # Errors
-    /// Those of `out`.
+    /// Errors of `out`.
     pub fn write_csv(&self, out: &mut dyn std::io::Write) -> Result<(), BoxError> {
         let mut table = csv::WriterBuilder::new().has_headers(false).from_writer(out);
         table.write_record(self.data().map(|column| column.name))?;

@@ -160,7 +160,7 @@ impl Tradeoff {
     /// Writes picture and numbers.
     ///
     /// # Errors
-    /// Those of the folder.
+    /// Errors of the folder.
     pub fn write(&self, dir: &OutDir, plot_style: &PlotStyle) -> Result<(), OutputError> {
         let sheet = self.sheet();
         self.picture(plot_style).write(dir, PICTURE)?;

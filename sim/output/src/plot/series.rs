@@ -181,7 +181,7 @@ impl PlotMark {
         }
     }
 
-    /// Its entry in a legend.
+    /// Entry of the series in a legend.
     pub(super) fn key(&self, style: Style) -> Key {
         match self {
             Self::Band(_) => Key::Area(style.colour.alpha(0.55)),

@@ -15,7 +15,7 @@ use pipeline::{FrameReport, Gpu};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use traces::io::atomic;
-use workloads::Settings;
+use workloads::SceneSettings;
 use workloads::job::{Drawn, Draws, JobError};
 
 use super::{DrawnFrames, RecordedFrame, TimedFrames};
@@ -189,8 +189,14 @@ impl RecordedRun {
             return Err(RunError::invalid(format_args!("--set {change}"), why));
         }
         let About { width, height, samples, frame_rate_hz, frames: [start, end], seed, .. } = self.about;
-        let settings =
-            Settings { width, height, samples, frame_rate_hz, frames: start..end, ..Settings::default() };
+        let settings = SceneSettings {
+            width,
+            height,
+            samples,
+            frame_rate_hz,
+            frames: start..end,
+            ..SceneSettings::default()
+        };
         let options = RunOptions { seed, ..options };
         let plan = Plan::of_job(options, &self.about.scene, Arc::new(RecordedJob { settings }))?;
         match first_difference("pipeline", &self.about.pipeline, &pipeline_of(&plan)) {
@@ -273,7 +279,7 @@ fn first_difference(path: &str, a: &Value, b: &Value) -> Option<(String, [String
 
 /// The job of a recording: its frames were drawn before.
 struct RecordedJob {
-    settings: Settings,
+    settings: SceneSettings,
 }
 
 impl RecordedJob {
@@ -285,7 +291,7 @@ impl RecordedJob {
 impl Draws for RecordedJob {
     type Input = ();
 
-    fn settings(&self) -> &Settings {
+    fn settings(&self) -> &SceneSettings {
         &self.settings
     }
 

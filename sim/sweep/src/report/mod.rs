@@ -71,7 +71,7 @@ pub struct SweepReport {
     /// Settings that vary and have no effects, or effects of groups of their values alone.
     pub no_effects: Vec<NoEffect>,
     /// Points that failed, were screened out or are undecided.
-    pub failed: Vec<PointFailure>,
+    pub failed: Vec<UnmeasuredPoint>,
     /// Points that are left out; the sum of the next four.
     pub left_out: usize,
     /// Points left out that failed.
@@ -88,7 +88,7 @@ pub struct SweepReport {
 
 /// A point that failed, was screened out or is undecided.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct PointFailure {
+pub struct UnmeasuredPoint {
     /// Settings of the point.
     pub settings: String,
     /// Why.
@@ -113,7 +113,7 @@ impl SweepReport {
         // With screening, designs are compared at the last level.
         let same = if plan.screen.is_empty() { &["seed"][..] } else { &["seed", "timing"] };
         let points = plan.last_level();
-        let failure = |point: &Point, outcome: Outcome| PointFailure {
+        let failure = |point: &Point, outcome: Outcome| UnmeasuredPoint {
             settings: label(&point.settings, &names),
             screened_out: matches!(outcome, Outcome::ScreenedOut(_)),
             undecided: matches!(outcome, Outcome::Undecided(_)),
@@ -136,7 +136,7 @@ impl SweepReport {
             }
         }
         let left_out = points.len() - rows.len();
-        let count = |is: fn(&PointFailure) -> bool| failed.iter().filter(|failure| is(failure)).count();
+        let count = |is: fn(&UnmeasuredPoint) -> bool| failed.iter().filter(|failure| is(failure)).count();
         let left_out_screened = count(|failure| failure.screened_out);
         let left_out_undecided = count(|failure| failure.undecided);
         let of_rows = Self::of_rows(rows, options);

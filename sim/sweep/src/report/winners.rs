@@ -27,7 +27,7 @@ pub enum Measure {
 }
 
 impl Measure {
-    /// Those that are measured with errors.
+    /// Measures whose values have errors.
     const ALL: [Self; 3] = [Self::Time, Self::Energy, Self::EnergyDelay];
 
     /// Name.

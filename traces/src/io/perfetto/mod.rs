@@ -112,7 +112,7 @@ const COUNTERS_UUID: u64 = PROCESS_UUID + 0x2_0000;
 /// Writes the timeline to `out` in the format of `.perfetto-trace` files.
 ///
 /// # Errors
-/// Those of `out`.
+/// Errors of `out`.
 pub fn write(timeline: &PerfettoTimeline<'_>, out: &mut dyn Write) -> io::Result<()> {
     let mut trace = Trace { out };
     trace.process(timeline.process)?;

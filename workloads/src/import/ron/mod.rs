@@ -16,7 +16,7 @@ use crate::error::{LoadError, Source};
 use crate::import::{Format, bare, gltf, reader, soup};
 use crate::material::{Alpha, Light, Material};
 use crate::scene::{
-    CameraSpec, Interpolation, Local, Mesh, MorphTarget, Node, Parts, Rig, SceneCamera, Settings, Spin,
+    CameraSpec, Interpolation, Local, Mesh, MorphTarget, Node, Parts, Rig, SceneCamera, SceneSettings, Spin,
     Track, Trs, rotation,
 };
 use crate::shapes::checker;
@@ -105,10 +105,10 @@ fn build(spec: SceneSpec, path: &Path) -> Result<Parts, LoadError> {
     Ok(parts)
 }
 
-fn settings(context: Context, spec: &SettingsSpec) -> Settings {
-    let plain = Settings::default();
+fn settings(context: Context, spec: &SettingsSpec) -> SceneSettings {
+    let plain = SceneSettings::default();
     let (start, end) = spec.frames.unwrap_or((0, 12));
-    Settings {
+    SceneSettings {
         width: spec.width.unwrap_or(plain.width),
         height: spec.height.unwrap_or(plain.height),
         samples: spec.samples.unwrap_or(plain.samples),
@@ -169,7 +169,7 @@ fn take_lens(
     context: Context,
     camera: &CameraSpec,
     given: &SettingsSpec,
-    settings: &mut Settings,
+    settings: &mut SceneSettings,
 ) -> Result<(), LoadError> {
     let image = [
         ("width", camera.width.is_some()),
@@ -194,7 +194,7 @@ fn take_lens(
     Ok(())
 }
 
-fn looking(context: Context, spec: &CameraSpec, settings: &Settings) -> Result<SceneCamera, LoadError> {
+fn looking(context: Context, spec: &CameraSpec, settings: &SceneSettings) -> Result<SceneCamera, LoadError> {
     let place = |field: &str| if field == "camera" { field.to_owned() } else { format!("camera.{field}") };
     spec.check()
         .and_then(|()| spec.scene_camera(settings))

@@ -10,8 +10,8 @@ use run::{Plan, RunOptions, frames_of};
 use serde::Serialize;
 use workloads::caustics::generator::Ocean;
 use workloads::caustics::{
-    Beam, BeamMethod, DrawnLight, Eye, Floor, LightPicture, MIN_SQUARES_PER_WAVE, Squares, accuracy_warnings,
-    crossing, draw, error,
+    Beam, BeamMethod, Eye, Floor, LightPicture, LightQuantity, MIN_SQUARES_PER_WAVE, Squares,
+    accuracy_warnings, crossing, draw, error,
 };
 use workloads::job::OptionSource;
 use workloads::scene::Overrides;
@@ -148,12 +148,12 @@ fn by_method(
     bar: &Bar,
 ) -> Result<Vec<CausticsRow>, StudyError> {
     let (beams, eye) = (water(effort.sweep_cells, slope).beams(0.0), aside(effort.sweep_px)?);
-    let ours = draw(&beams, &eye, BeamMethod::Moving, Some(DrawnLight::Volume));
+    let ours = draw(&beams, &eye, BeamMethod::Moving, Some(LightQuantity::Volume));
     let crossing = crossing(&beams);
     let row = |method| {
         let once = || {
             let start = ThreadTime::now();
-            let picture = draw(&beams, &eye, method, Some(DrawnLight::Volume));
+            let picture = draw(&beams, &eye, method, Some(LightQuantity::Volume));
             (start.elapsed().as_secs_f64(), picture)
         };
         let mut runs = thread
@@ -187,7 +187,7 @@ fn by_cells(effort: &CausticsEffort, slope: f64, bar: &Bar) -> Result<Vec<Coarse
     let row = |&cells: &u32| {
         let surface = surface(cells);
         let beams = surface.beams(0.0);
-        let found = draw(&beams, &eye, BeamMethod::Moving, Some(DrawnLight::Floor(floor))).light;
+        let found = draw(&beams, &eye, BeamMethod::Moving, Some(LightQuantity::Floor(floor))).light;
         bar.inc();
         let warned = !accuracy_warnings(&surface, &beams).is_empty();
         let error = error(&squares.of_image(&found), &known);
@@ -281,9 +281,9 @@ impl Bench {
         let surface = Ocean { pleat, ..self.surface.clone() };
         let beams = surface.beams(0.0);
         let pictures =
-            BeamMethod::ALL.map(|method| draw(&beams, &self.aside, method, Some(DrawnLight::Volume)));
+            BeamMethod::ALL.map(|method| draw(&beams, &self.aside, method, Some(LightQuantity::Volume)));
         let ours = &pictures[0];
-        let uncut = draw(&beams, &self.aside, BeamMethod::Uncut, Some(DrawnLight::Volume));
+        let uncut = draw(&beams, &self.aside, BeamMethod::Uncut, Some(LightQuantity::Volume));
         let sum = |picture: &LightPicture| picture.light.iter().sum::<f64>();
         let (volume_error, missing) = self.volume(&beams, ours);
         Crossed {
@@ -306,7 +306,7 @@ impl Bench {
 
     fn floor_error(&self, beams: &[Beam]) -> f64 {
         let squares = Squares { eye: &self.above, side_px: SQUARE_PX };
-        let image = draw(beams, &self.above, BeamMethod::Moving, Some(DrawnLight::Floor(floor())));
+        let image = draw(beams, &self.above, BeamMethod::Moving, Some(LightQuantity::Floor(floor())));
         error(&squares.of_image(&image.light), &self.known[0])
     }
 

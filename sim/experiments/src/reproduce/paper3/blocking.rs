@@ -179,9 +179,9 @@ fn turning(shares: Vec<(f64, f64)>) -> Figure {
 fn three_frames(bench: &Bench<'_>) -> Result<Figure, RunError> {
     let shown = vec![bench.frame(); 3 * FRAME];
     let curve = |circumstances| -> Result<_, RunError> {
-        let recording = bench.on_phone(&shown, circumstances)?;
-        let frame = &recording.truth.frames[FRAME];
-        Ok(recording.points(frame.start_s, frame.end_s))
+        let run = bench.on_phone(&shown, circumstances)?;
+        let frame = &run.truth.frames[FRAME];
+        Ok(run.points(frame.start_s, frame.end_s))
     };
     let series = vec![
         line("settled", curve(settled(1))?),
@@ -228,8 +228,8 @@ fn pool(
 ) -> Result<Pooled, RunError> {
     let shown_frames = looped(&bench.pc_frames, bench.recorded_frames());
     let run = |seed| {
-        let recording = bench.on(stage, &shown_frames, how(seed))?;
-        Ok(recording.by_true_frame_j(&recording.find(MARKED)?))
+        let run = bench.on(stage, &shown_frames, how(seed))?;
+        Ok(run.by_true_frame_j(&run.find(MARKED)?))
     };
     let runs = (first..first + bench.repeats()).map(run);
     let runs: Vec<Vec<Option<f64>>> = runs.collect::<Result<_, RunError>>()?;

@@ -317,23 +317,23 @@ fn scored(bench: &Bench<'_>, pacing: Pacing, first_seed: u64) -> Result<(Searche
     let mut first = None;
     let (mut squares, mut tracking) = (Vec::new(), Vec::new());
     for seed in first_seed..first_seed + bench.repeats() {
-        let recording = bench.on_pc(pacing, settled(seed))?;
-        let tracked = recording.find(marked)?;
-        squares.push(recording.score(&recording.find_by(FinderMethod::SumOfSquares, marked)?, within_s));
-        tracking.push(recording.score(&tracked, within_s));
-        first.get_or_insert((recording, tracked));
+        let run = bench.on_pc(pacing, settled(seed))?;
+        let tracked = run.find(marked)?;
+        squares.push(run.score(&run.find_by(FinderMethod::SumOfSquares, marked)?, within_s));
+        tracking.push(run.score(&tracked, within_s));
+        first.get_or_insert((run, tracked));
     }
     let none = || RunError::setting("no recording was requested");
     Ok((first.ok_or_else(none)?, [Found::of(&squares), Found::of(&tracking)]))
 }
 
 /// Some frames from the middle, with the starts that were found.
-fn shown_frames(name: &'static str, title: &str, (recording, frames): &Searched, count: usize) -> Figure {
-    let middle = recording.truth.frames.len() / 2;
-    let (first, last) = (&recording.truth.frames[middle], &recording.truth.frames[middle + count - 1]);
+fn shown_frames(name: &'static str, title: &str, (run, frames): &Searched, count: usize) -> Figure {
+    let middle = run.truth.frames.len() / 2;
+    let (first, last) = (&run.truth.frames[middle], &run.truth.frames[middle + count - 1]);
     let margin_s = 0.05 * (last.end_s - first.start_s);
     let (from_s, to_s) = (first.start_s - margin_s, last.end_s + margin_s);
-    let points = recording.points(from_s, to_s);
+    let points = run.points(from_s, to_s);
     let near = |time_s: f64| points.iter().find(|point| point.0 >= time_s).map_or(0.0, |point| point.1);
     let starts = frames.found.iter().map(|frame| frame.start_s);
     let starts = starts

@@ -46,7 +46,7 @@ impl Planted {
         let shown = vec![bench.frame(); *bench.settings.iii_3.recorded.get(bench.form)];
         let recordings = (1..=bench.repeats()).map(|seed| bench.on(&stage, &shown, launched(seed)));
         let recordings: Vec<TracedRun> = recordings.collect::<Result<_, _>>()?;
-        let energies = recordings.iter().map(|recording| Ok(recording.find(1)?.energies_j()));
+        let energies = recordings.iter().map(|run| Ok(run.find(1)?.energies_j()));
         let energies: Vec<Vec<f64>> = energies.collect::<Result<_, RunError>>()?;
         let knees = energies.iter().map(|energies| settles(energies)).collect();
         Ok(Self { recordings, energies, knees, frames: planted_s / stage.capped_period_s()? })
@@ -130,10 +130,10 @@ pub(super) fn warm_up(bench: &Bench<'_>) -> Result<Done, RunError> {
 }
 
 /// Figure 5a: nine frames about the drop.
-fn drop(recording: &TracedRun) -> Figure {
-    let frames = &recording.truth.frames;
+fn drop(run: &TracedRun) -> Figure {
+    let frames = &run.truth.frames;
     let (from_s, to_s) = (frames[44].start_s, frames[52].end_s);
-    let points = recording.points(from_s, to_s);
+    let points = run.points(from_s, to_s);
     Figure::lines(
         "III_fig5a",
         "Power drops some frames after launch (Paper III, Figure 5a)",
@@ -183,14 +183,14 @@ fn discarded(energies: &[f64], knee: usize) -> Figure {
 const SHORT: usize = 24;
 
 /// The disturbances of the kind that is listed first: those every five seconds.
-fn five_second_ones(recording: &TracedRun) -> Vec<&Pulse> {
-    recording.truth.pulses.iter().filter(|pulse| pulse.cause == Cause::Disturbance(0)).collect()
+fn five_second_ones(run: &TracedRun) -> Vec<&Pulse> {
+    run.truth.pulses.iter().filter(|pulse| pulse.cause == Cause::Disturbance(0)).collect()
 }
 
 /// For each true frame, how much of it is disturbed, s.
-fn overlaps_s(recording: &TracedRun) -> Vec<f64> {
-    let pulses = five_second_ones(recording);
-    let frames = recording.truth.frames.iter();
+fn overlaps_s(run: &TracedRun) -> Vec<f64> {
+    let pulses = five_second_ones(run);
+    let frames = run.truth.frames.iter();
     frames.map(|frame| pulses.iter().map(|pulse| pulse.overlap_s(frame.start_s, frame.end_s)).sum()).collect()
 }
 
@@ -204,18 +204,13 @@ struct Tally {
     disturbances: usize,
 }
 
-fn tally(recording: &TracedRun, flags: &[bool]) -> Tally {
-    let touched: Vec<bool> = overlaps_s(recording).iter().map(|overlap_s| *overlap_s > 0.0).collect();
-    let counts: Vec<usize> = five_second_ones(recording)
+fn tally(run: &TracedRun, flags: &[bool]) -> Tally {
+    let touched: Vec<bool> = overlaps_s(run).iter().map(|overlap_s| *overlap_s > 0.0).collect();
+    let counts: Vec<usize> = five_second_ones(run)
         .into_iter()
-        .filter(|pulse| pulse.start_s > recording.truth.start_s && pulse.end_s < recording.truth.end_s)
+        .filter(|pulse| pulse.start_s > run.truth.start_s && pulse.end_s < run.truth.end_s)
         .map(|pulse| {
-            recording
-                .truth
-                .frames
-                .iter()
-                .filter(|frame| pulse.overlap_s(frame.start_s, frame.end_s) > 0.0)
-                .count()
+            run.truth.frames.iter().filter(|frame| pulse.overlap_s(frame.start_s, frame.end_s) > 0.0).count()
         })
         .collect();
     Tally {
@@ -229,7 +224,7 @@ fn tally(recording: &TracedRun, flags: &[bool]) -> Tally {
 
 /// One frame drawn again and again, with what the analysis makes of it.
 struct Still {
-    recording: TracedRun,
+    run: TracedRun,
     energies: Vec<f64>,
     flags: Vec<bool>,
     tally: Tally,
@@ -240,17 +235,17 @@ struct Still {
 impl Still {
     fn new(bench: &Bench<'_>, extra_w: f64) -> Result<Self, RunError> {
         let shown = vec![bench.frame(); *bench.settings.work.still_frames.get(bench.form)];
-        let recording = bench.on(&bench.phone.clone().disturbed(extra_w)?, &shown, settled(5))?;
+        let run = bench.on(&bench.phone.clone().disturbed(extra_w)?, &shown, settled(5))?;
         // A frame that was not found counts as one of no energy, which nobody could overlook.
-        let found = recording.by_true_frame_j(&recording.find(1)?);
+        let found = run.by_true_frame_j(&run.find(1)?);
         let energies: Vec<f64> = found.iter().map(|energy| energy.unwrap_or(0.0)).collect();
         let flags = outliers(&energies);
-        let tally = tally(&recording, &flags);
+        let tally = tally(&run, &flags);
         let kept = unflagged(&energies, &flags);
         let deviation_mj =
             |values: &[f64]| 1e3 * Spread::of(values).map_or(f64::NAN, |spread| spread.deviation);
         let deviations_mj = [deviation_mj(&energies), deviation_mj(&kept)];
-        Ok(Self { recording, energies, flags, tally, deviations_mj })
+        Ok(Self { run, energies, flags, tally, deviations_mj })
     }
 
     /// Whether the frames flagged are those touched.
@@ -300,14 +295,14 @@ pub(super) fn five_seconds(bench: &Bench<'_>) -> Result<Done, RunError> {
         ("recordings", watts.len() as f64 + 1.0 + *row.shorts.get(form) as f64),
         ("frames_of_one", base.energies.len() as f64),
         ("disturbances", disturbances as f64),
-        ("samples_of_one", base.recording.trace.samples() as f64),
+        ("samples_of_one", base.run.trace.samples() as f64),
     ]);
     let made = with.banded(&row.about, ours, band);
     let note = match reason(&base) {
         None => made.note.clone(),
         Some(reason) => format!("{}; {reason}", made.note),
     };
-    let figures = vec![hit(&base.recording), flagged(&base.energies, &base.flags), growing(bench)?];
+    let figures = vec![hit(&base.run), flagged(&base.energies, &base.flags), growing(bench)?];
     Ok(Done { row: ClaimRow { numbers: facts, ran, note, ..made }, figures })
 }
 
@@ -316,7 +311,7 @@ fn reason(still: &Still) -> Option<String> {
     if still.same() {
         return None;
     }
-    let overlaps = overlaps_s(&still.recording);
+    let overlaps = overlaps_s(&still.run);
     let wrong = overlaps
         .iter()
         .zip(&still.flags)
@@ -329,21 +324,20 @@ fn reason(still: &Still) -> Option<String> {
 }
 
 /// Figure 8, lower right: power over a group of disturbed frames.
-fn hit(recording: &TracedRun) -> Figure {
-    let inside = |pulse: &&&Pulse| {
-        pulse.start_s > recording.truth.start_s + 0.2 && pulse.end_s < recording.truth.end_s - 0.2
-    };
-    let pulses = five_second_ones(recording);
+fn hit(run: &TracedRun) -> Figure {
+    let inside =
+        |pulse: &&&Pulse| pulse.start_s > run.truth.start_s + 0.2 && pulse.end_s < run.truth.end_s - 0.2;
+    let pulses = five_second_ones(run);
     let centre_s = pulses
         .iter()
         .find(inside)
-        .map_or(recording.truth.start_s + 0.2, |pulse| 0.5 * (pulse.start_s + pulse.end_s));
+        .map_or(run.truth.start_s + 0.2, |pulse| 0.5 * (pulse.start_s + pulse.end_s));
     Figure::lines(
         "III_fig8_power",
         "A disturbance on top of identical frames (Paper III, Figure 8, lower right)",
         "the phone draws one frame again and again",
         [TIME, POWER],
-        vec![line("recorded", recording.points(centre_s - 0.15, centre_s + 0.15))],
+        vec![line("recorded", run.points(centre_s - 0.15, centre_s + 0.15))],
     )
 }
 
@@ -366,8 +360,8 @@ fn growing(bench: &Bench<'_>) -> Result<Figure, RunError> {
     let shown = vec![bench.frame(); SHORT];
     let (mut energies, mut first_hits) = (vec![Vec::new(); SHORT], [None; SHORT]);
     for seed in 0..*bench.settings.iii_6.shorts.get(bench.form) {
-        let recording = bench.on_phone(&shown, settled(100 + seed))?;
-        let frames = recording.by_timestamps_j().into_iter().zip(overlaps_s(&recording));
+        let run = bench.on_phone(&shown, settled(100 + seed))?;
+        let frames = run.by_timestamps_j().into_iter().zip(overlaps_s(&run));
         for ((energy, overlap_s), (list, first_hit)) in frames.zip(energies.iter_mut().zip(&mut first_hits)) {
             list.push(energy);
             if overlap_s > 5e-3 {

@@ -12,7 +12,7 @@ use workloads::collision::{
 use workloads::shapes;
 
 use super::super::report::over_doublings;
-use super::super::row::{Cases, ClaimRow, RowNumber, numbers};
+use super::super::row::{Cases, ClaimRow, NamedValue, numbers};
 use super::super::{Done, Figure};
 use super::figures::{Ends, overlaps};
 use super::settings::{Moving, Shape, TwoObjects};
@@ -29,7 +29,7 @@ const fn name(method: CollisionMethod) -> &'static str {
 }
 
 /// What the modelled hardware drew, and what the host did, as the rows print them.
-fn ran(hardware: &PassWork, host: &PassWork) -> Vec<RowNumber> {
+fn ran(hardware: &PassWork, host: &PassWork) -> Vec<NamedValue> {
     numbers([
         ("passes", hardware.passes as f64),
         ("draws", hardware.draws as f64),
@@ -176,7 +176,7 @@ impl Comparisons {
     }
 
     /// All work, and that of each kind of public case that there is.
-    fn ran(&self, hardware: &PassWork) -> Vec<RowNumber> {
+    fn ran(&self, hardware: &PassWork) -> Vec<NamedValue> {
         let Self { generated, collide, apart, swept, .. } = self;
         let mut all =
             ran(hardware, &work_of([generated, collide, apart].map(|drawn| &drawn.work).into_iter()));
@@ -277,7 +277,7 @@ pub(super) fn missed(task: &Task<'_>) -> Result<Done, RunError> {
 }
 
 /// How many cases of each kind there are, and how many of those that do not collide are kept.
-fn facts(comparisons: &Comparisons, public: &Public) -> Vec<RowNumber> {
+fn facts(comparisons: &Comparisons, public: &Public) -> Vec<NamedValue> {
     let [fewest, most] = comparisons.false_positives().unwrap_or([f64::NAN; 2]);
     let cleared = || comparisons.apart.cleared.iter().copied();
     numbers([

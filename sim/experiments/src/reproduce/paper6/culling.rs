@@ -19,7 +19,7 @@ use super::{Task, catalogue};
 use crate::chart::occlusion::{Drawn, OcclusionBlur, QueryAnswers};
 use crate::reproduce::Done;
 use crate::reproduce::report::{Figure, over_doublings};
-use crate::reproduce::row::{Cases, ClaimRow, RowNumber, Verdict, numbers, one_at_a_time, ran, short};
+use crate::reproduce::row::{Cases, ClaimRow, NamedValue, Verdict, numbers, one_at_a_time, ran, short};
 use crate::study::Ran;
 
 /// Draws the scenes of a kind, with `queries` queried boxes in each.
@@ -136,7 +136,7 @@ pub(super) fn rate(task: &Task<'_>) -> Result<Done, RunError> {
 }
 
 /// The result in words and in numbers, with tiles of `tile_px`.
-fn rates_found(curves: &[Rates], tile_px: u32, wrong: u64) -> (String, Vec<RowNumber>) {
+fn rates_found(curves: &[Rates], tile_px: u32, wrong: u64) -> (String, Vec<NamedValue>) {
     let base = curves.iter().find(|rates| rates.tile_px == tile_px).map(|rates| &rates.found);
     let listed: Vec<String> =
         base.into_iter().flatten().map(|(boxes, rate)| format!("{boxes}: {rate:.3}")).collect();

@@ -22,7 +22,7 @@ use crate::reproduce::report::line;
 use crate::reproduce::row::{Band, Cases, ClaimRow, numbers, ran};
 use crate::reproduce::settings::Form;
 use crate::reproduce::{Done, Figure};
-use crate::stress::measure::TilePlace;
+use crate::stress::measure::TileAndCamera;
 use crate::study::Ran;
 
 /// Widths of depth intervals in tiles, over those of the vertices.
@@ -404,7 +404,7 @@ impl<'a> Alone<'a> {
             if count == 0 {
                 continue;
             }
-            let place = TilePlace::new(
+            let place = TileAndCamera::new(
                 self.scene.viewport,
                 self.projection.shear,
                 self.projection.near,

@@ -9,7 +9,7 @@ use pipeline::conservative::{Grid, MovingTriangle, Rasterizer, View};
 use pipeline::{Camera, Cull, Draw, Geometry, Gpu, LensShape, RasterPass, SampleTable, Viewport};
 use run::{GpuSpec, RunError};
 use workloads::caustics::generator::Ocean;
-use workloads::caustics::{Beam, BeamMethod, DrawnLight, Eye, Floor, LightPicture, draw};
+use workloads::caustics::{Beam, BeamMethod, Eye, Floor, LightPicture, LightQuantity, draw};
 use workloads::job::{JobRequest, OptionSource};
 use workloads::material::Light as SceneLight;
 use workloads::material::{Material, SurfaceShader};
@@ -295,7 +295,8 @@ const PANEL_PX: [u32; 2] = [120, 160];
 /// Figure 7: which pixels each method shades for one warped beam, and in which of them there is light.
 pub(super) fn warped() -> Result<Figure, RunError> {
     let eye = beside().ok_or_else(|| RunError::setting("a view without extent"))?;
-    let pictures = BeamMethod::ALL.map(|method| draw(&[twisted()], &eye, method, Some(DrawnLight::Volume)));
+    let pictures =
+        BeamMethod::ALL.map(|method| draw(&[twisted()], &eye, method, Some(LightQuantity::Volume)));
     let tiles: Vec<HeatTile> =
         (0..).zip(&pictures).flat_map(|(panel, picture)| areas_of(panel, picture)).collect();
     let areas = BeamMethod::ALL.iter().zip(&pictures);
@@ -354,7 +355,7 @@ pub(super) fn light(form: Form) -> Result<[Figure; 2], RunError> {
     let beams = water.beams(0.0);
     let aside = measure::aside([width, height])?;
     let above = measure::above(height)?;
-    let floor = DrawnLight::Floor(Floor { height_m: -measure::DEPTH_M });
+    let floor = LightQuantity::Floor(Floor { height_m: -measure::DEPTH_M });
     let image = |name, what: &str, label: &str, eye: &Eye, light| {
         let picture = draw(&beams, eye, BeamMethod::Moving, Some(light));
         let subject =
@@ -368,7 +369,7 @@ pub(super) fn light(form: Form) -> Result<[Figure; 2], RunError> {
         Figure { name, picture: map.picture(&PlotStyle::default()) }
     };
     Ok([
-        image("VI_caustics_volume", "in the water, from the side", "W/m", &aside, DrawnLight::Volume),
+        image("VI_caustics_volume", "in the water, from the side", "W/m", &aside, LightQuantity::Volume),
         image("VI_caustics_floor", "on the floor, from above", "W/m2", &above, floor),
     ])
 }

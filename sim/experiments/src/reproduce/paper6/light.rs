@@ -9,7 +9,7 @@ use run::{GpuSpec, RunError};
 use workloads::Overrides;
 use workloads::caustics::generator::{Ocean, turned_beams};
 use workloads::caustics::{
-    Beam, BeamMethod, Coverage, DrawnLight, Eye, Floor, LightPicture, draw_on, receivers,
+    Beam, BeamMethod, Coverage, Eye, Floor, LightPicture, LightQuantity, draw_on, receivers,
 };
 use workloads::glossy::GlossyEffect;
 use workloads::job::{Drawn, Job};
@@ -22,7 +22,7 @@ use crate::chart::caustics::measure::{DEPTH_M, SIDE_M, WAVE_M, aside_of, water};
 use crate::chart::caustics::{OceanCounts, ocean};
 use crate::chart::glossy::{Blur, GlossyBench, GlossyEffort, GlossyRow as Measured};
 use crate::reproduce::report::line;
-use crate::reproduce::row::{Band, Cases, ClaimRow, RowNumber, Verdict, numbers, one_at_a_time, ran};
+use crate::reproduce::row::{Band, Cases, ClaimRow, NamedValue, Verdict, numbers, one_at_a_time, ran};
 use crate::reproduce::settings::Form;
 use crate::reproduce::{Done, Figure};
 use crate::study::{Ran, StudyError};
@@ -71,7 +71,7 @@ impl Oceans {
     }
 
     /// Work on the host. The ocean of the values given is in both sweeps and was drawn once.
-    fn ran(&self, depth_m: f64) -> Vec<RowNumber> {
+    fn ran(&self, depth_m: f64) -> Vec<NamedValue> {
         let others = self.depths.iter().filter(|(at, _)| *at != depth_m).chain(&self.slopes);
         let drawn: Vec<&OceanCounts> = others.map(|(_, counted)| counted).collect();
         let draws: u64 = drawn.iter().map(|counted| counted.draws).sum();
@@ -133,7 +133,7 @@ fn base_on_hardware(
     let (beams, mut work) = (water.beams(0.0), Ran::default());
     let mut executions = [0; 4];
     for (method, executions) in BeamMethod::ALL.into_iter().zip(&mut executions) {
-        let (picture, of_method) = on_hardware(&beams, &eye, method, DrawnLight::Volume)?;
+        let (picture, of_method) = on_hardware(&beams, &eye, method, LightQuantity::Volume)?;
         work += of_method;
         *executions = picture.total_runs();
     }
@@ -145,7 +145,7 @@ fn on_hardware(
     beams: &[Beam],
     eye: &Eye,
     method: BeamMethod,
-    light: DrawnLight,
+    light: LightQuantity,
 ) -> Result<(LightPicture, Ran), RunError> {
     let spec = GpuSpec::load("reference")?.pipeline;
     let mut gpu = Gpu::without_packets(&spec)?;
@@ -264,7 +264,7 @@ fn turned(row: &Lost, form: Form, height_m: f64) -> Result<(Coverage, Ran), RunE
 /// Which receivers on a floor are covered, which the host finds, and what the modelled hardware draws of the
 /// same beams.
 fn covered(beams: &[Beam], eye: &Eye, floor: Floor) -> Result<(Coverage, Ran), RunError> {
-    let (_, drawn) = on_hardware(beams, eye, BeamMethod::Moving, DrawnLight::Floor(floor))?;
+    let (_, drawn) = on_hardware(beams, eye, BeamMethod::Moving, LightQuantity::Floor(floor))?;
     Ok((receivers(beams, eye, BeamMethod::Moving, &floor), drawn))
 }
 

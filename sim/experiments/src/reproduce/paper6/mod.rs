@@ -133,7 +133,7 @@ struct Public {
     pub scenes: usize,
     /// Pairs of their objects that collide, by the lists that come with them.
     pub known: usize,
-    /// Those of them in which two triangles were seen to cross or to share a corner; which pairs the others
+    /// Pairs of them in which two triangles were seen to cross or to share a corner; which pairs the others
     /// are is not known.
     pub seen: usize,
     /// Pairs of scenes, at least, and queries missed by `quintile ccd`.
@@ -146,7 +146,7 @@ struct Public {
     pub collide: Vec<Pair>,
     /// The queries that do not collide, which passes may clear or keep.
     pub apart: Vec<Pair>,
-    /// Those of them that `quintile ccd` keeps.
+    /// Queries of them that `quintile ccd` keeps.
     pub kept_closer: usize,
 }
 

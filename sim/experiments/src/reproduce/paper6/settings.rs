@@ -256,7 +256,7 @@ pub(super) enum Shape {
 #[serde(rename_all = "snake_case")]
 pub(super) enum QueriedObjects {
     All,
-    /// Those that no sample sees.
+    /// Objects that no sample sees.
     Hidden,
 }
 

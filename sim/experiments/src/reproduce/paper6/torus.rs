@@ -8,7 +8,7 @@ use workloads::points::quality::upper_tail;
 use workloads::points::volume::{Blurred, CoveredSamples, SamplePoint, Torus, every_sample, standard_mode};
 
 use super::super::report::dots;
-use super::super::row::{self, Cases, ClaimRow, RowNumber, numbers};
+use super::super::row::{self, Cases, ClaimRow, NamedValue, numbers};
 use super::super::{Done, Figure};
 use super::Task;
 use crate::study::Ran;
@@ -184,7 +184,7 @@ impl Scatter {
         )
     }
 
-    fn facts(&self) -> Vec<RowNumber> {
+    fn facts(&self) -> Vec<NamedValue> {
         numbers([
             ("deviations", self.0.len() as f64),
             ("scatter_in_standard_errors", self.rms()),
@@ -236,7 +236,7 @@ pub(super) fn row(task: &Task<'_>) -> Result<Done, RunError> {
         disks[0].text(),
         disks[1].text()
     );
-    let mut numbers: Vec<RowNumber> = facts(first).into_iter().chain(scatter.facts()).collect();
+    let mut numbers: Vec<NamedValue> = facts(first).into_iter().chain(scatter.facts()).collect();
     numbers.extend(self::numbers([
         ("deviation_of_count_4d", disks[0].count_off),
         ("deviation_of_count_5d", disks[1].count_off),
@@ -260,7 +260,7 @@ fn ours(first: &Filled, torus: &Torus) -> String {
     )
 }
 
-fn facts(first: &Filled) -> Vec<RowNumber> {
+fn facts(first: &Filled) -> Vec<NamedValue> {
     numbers([
         ("inside", first.inside),
         ("expected", first.expected),
@@ -270,7 +270,7 @@ fn facts(first: &Filled) -> Vec<RowNumber> {
     ])
 }
 
-fn ran(filled: &[Filled], disks: &[Disk]) -> Vec<RowNumber> {
+fn ran(filled: &[Filled], disks: &[Disk]) -> Vec<NamedValue> {
     let mut ran = row::ran(&filled.iter().map(|one| one.ran).chain(disks.iter().map(|disk| disk.ran)).sum());
     ran.extend(numbers([
         ("samples", filled.iter().map(|one| one.found.samples as f64).sum()),
