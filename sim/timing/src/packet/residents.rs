@@ -158,8 +158,8 @@ impl Residents {
         while self.vertices.len() > MAX_AHEAD && self.end_next(f64::INFINITY) {}
     }
 
-    /// Begin the next warp of vertices that waits, if it is ready by `to`. No warp may end before `to`. A warp
-    /// that finds no slot is left out; then warps that have not begun hold all slots.
+    /// Begin the next warp of vertices that waits, if it is ready by `to`. No warp may end before `to`. One that
+    /// finds no free slot is left out: it would wait here and in the slots of vertices.
     fn begin_vertices(&mut self, to: f64) -> bool {
         let Some(WaitingVertices { from, warps }) =
             self.vertices.front().copied().filter(|first| first.from <= to)
@@ -167,8 +167,9 @@ impl Residents {
             return false;
         };
         self.vertices.pop_front();
-        if let Some(place) = self.take(1, from) {
-            self.cores.start(place, from.max(place.at), &warps);
+        if let Some(place) = self.cores.place(1, from).filter(|place| place.at <= from) {
+            self.cores.take(place, 1);
+            self.cores.start(place, from, &warps);
         }
         true
     }

@@ -65,7 +65,8 @@ fn drawn(seed: u64) -> Gpu {
 }
 
 /// Streams by GPU on which `packet` is more than 8 % off and does not warn: what was found of 120.
-const FAR: [(u64, &str); 2] = [(2, "groups that stream"), (8, "atomics on one word")];
+const FAR: [(u64, &str); 3] =
+    [(2, "groups that stream"), (8, "passes in a chain"), (8, "atomics on one word")];
 
 /// What `packet` and `bound` say of a stream on a GPU.
 struct Pair {
