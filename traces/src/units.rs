@@ -161,11 +161,11 @@ pub(crate) fn jls_unit(text: &str) -> Option<f64> {
 /// or in the unit `bare` if there is none.
 ///
 /// ```
-/// use traces::units::{Quantity, parse};
+/// use traces::units::{PhysicalQuantity, parse};
 ///
-/// assert_eq!(parse("2 min", Quantity::Time, "s"), Some(120.0));
-/// assert_eq!(parse("2", Quantity::Time, "ms"), Some(2e-3));
-/// assert_eq!(parse("2 V", Quantity::Time, "s"), None);
+/// assert_eq!(parse("2 min", PhysicalQuantity::Time, "s"), Some(120.0));
+/// assert_eq!(parse("2", PhysicalQuantity::Time, "ms"), Some(2e-3));
+/// assert_eq!(parse("2 V", PhysicalQuantity::Time, "s"), None);
 /// ```
 pub fn parse(text: &str, of: PhysicalQuantity, bare: &str) -> Option<f64> {
     let text = text.trim().replace(MICRO, "u");

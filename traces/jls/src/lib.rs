@@ -14,14 +14,14 @@
 //! payload, and checksums of both. The chunks of one kind and signal form a doubly linked list.
 //!
 //! ```
-//! use jls::{Reader, SignalName, Timestamp, Writer};
+//! use jls::{JlsWriter, Reader, SignalName, Timestamp};
 //! use std::fs::File;
 //!
 //! # let folder = std::env::temp_dir().join(format!("jls-doc-{}", std::process::id()));
 //! # std::fs::create_dir_all(&folder)?;
 //! # let path = folder.join("a.jls");
 //! let signals = [SignalName { name: "current", unit: "A" }, SignalName { name: "voltage", unit: "V" }];
-//! let mut writer = Writer::new(File::create(&path)?, "my instrument", 50_000, signals, "{}")?;
+//! let mut writer = JlsWriter::new(File::create(&path)?, "my instrument", 50_000, signals, "{}")?;
 //! writer.push([&[0.25; 1000], &[3.8; 1000]])?;
 //! writer.stamp(999, Timestamp::from_unix_s(1.7e9, 999.0 / 50e3).expect("within 272 years of 2018"))?;
 //! writer.finish()?;
