@@ -39,12 +39,10 @@ pub fn bound(machine: &MachineSpec, clocks: Clocks, totals: &Totals, mut recorde
     let memory = totals.memory();
     let mut times = Vec::with_capacity(lengths.len());
     let mut now: Time = 0;
-    let mut overlap: Time = 0;
     // Barriers come last in their phase.
     for ((phase, length), memory) in totals.phases.iter().zip(&lengths).zip(&memory) {
         let busy = speeds.times(&length.work);
-        let end = now + length.of(phase, &busy, memory.chips);
-        overlap += phase.longest_overlap().min(end - now);
+        let end = now + length.of(phase, &busy, *memory);
         write(&mut recorder, &clocks, &phase.counts, &busy, [now, end]);
         times.push([now, end - length.barriers, end]);
         now = end;
@@ -58,16 +56,12 @@ pub fn bound(machine: &MachineSpec, clocks: Clocks, totals: &Totals, mut recorde
     }
     recorder.lasts(clocks.ps(now));
     let timeline = recorder.finish();
-    let share = crate::ratio_to_busiest(clocks.ps(memory.iter().map(|memory| memory.rows).sum()), &timeline);
     Timed {
         cycles: clocks.cycles(Clock::Core, now),
         stalls: None,
         unit_cycles: 0,
         packets: totals.segments().map(|segment| u64::from(segment.packets)).sum(),
-        rows: Some(share),
-        disputed: None,
-        short_queues: crate::short_queues(&machine.dram, &timeline),
-        overlap: Some(overlap as f64 / now.max(1) as f64),
+        checked: None,
         passes: passes.finish(machine, &clocks, timeline.duration_ps, &totals.parts()),
         spans: Vec::new(),
         timeline,
@@ -202,13 +196,6 @@ struct Phase {
 }
 
 impl Phase {
-    /// The longest packet alone, if both paths have packets: for so long the phase may overlap the one
-    /// before, or leave off.
-    fn longest_overlap(&self) -> Time {
-        let [front, tiles] = self.longest.map(|longest| longest.alone);
-        if front > 0 && tiles > 0 { front.max(tiles) } else { 0 }
-    }
-
     /// The least time of each path. Between other batches each path works on two batches at once, unless it was
     /// empty or is emptied.
     fn floors(&self, is_emptied: bool) -> [Time; 2] {
@@ -236,7 +223,7 @@ pub struct Totals {
     closed: Vec<Segment>,
     banks: Banks,
     /// Times of memory, for each phase before the last.
-    memory: Vec<MemoryTime>,
+    memory: Vec<Time>,
     phases: Vec<Phase>,
     /// Work of every draw, by pass.
     draws: Vec<ByDraw<UnitWork>>,
@@ -347,7 +334,7 @@ impl Totals {
     /// Add phases up to `phase`.
     fn reach(&mut self, phase: usize) {
         if self.phases.len() <= phase {
-            self.memory.resize(phase, MemoryTime::default());
+            self.memory.resize(phase, 0);
             if let Some(last) = self.memory.last_mut() {
                 *last += self.banks.take_longest();
             }
@@ -356,9 +343,9 @@ impl Totals {
     }
 
     /// Times of memory in each phase.
-    fn memory(&self) -> Vec<MemoryTime> {
+    fn memory(&self) -> Vec<Time> {
         let mut memory = self.memory.clone();
-        memory.resize(self.phases.len(), MemoryTime::default());
+        memory.resize(self.phases.len(), 0);
         if let Some(last) = memory.last_mut() {
             *last += self.banks.clone().take_longest();
         }
@@ -511,22 +498,6 @@ impl Uncontended {
     }
 }
 
-/// Times that memory needs at least, since the last look.
-#[derive(Clone, Copy, Debug, Default)]
-struct MemoryTime {
-    /// The busiest bank, closing and opening rows.
-    rows: Time,
-    /// The busiest bank, rank or bus, with refresh.
-    chips: Time,
-}
-
-impl std::ops::AddAssign for MemoryTime {
-    fn add_assign(&mut self, other: Self) {
-        self.rows += other.rows;
-        self.chips += other.chips;
-    }
-}
-
 /// Time each bank spends closing and opening rows, and what rows and lines take of ranks and buses. This is a
 /// lower bound: lines of each client come in stream order, and clients never close each other's rows.
 #[derive(Clone, Debug)]
@@ -587,15 +558,15 @@ impl Banks {
         }
     }
 
-    /// Least times since the last call.
-    pub fn take_longest(&mut self) -> MemoryTime {
+    /// Least time since the last call: of the busiest bank, rank or bus, with refresh.
+    pub fn take_longest(&mut self) -> Time {
         let rows = self.busy.iter().copied().max().unwrap_or(0);
         let opened = self.opened.iter().copied().max().unwrap_or(0) * self.times.spacing();
         let moved = self.moved.iter().map(|&lines| self.on_bus(lines)).max().unwrap_or(0);
         self.busy.fill(0);
         self.opened.fill(0);
         self.moved.fill([0; 2]);
-        MemoryTime { rows, chips: self.with_refresh(rows.max(opened).max(moved)) }
+        self.with_refresh(rows.max(opened).max(moved))
     }
 
     /// Time of lines on the bus of a channel, with its turns.

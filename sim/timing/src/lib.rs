@@ -4,8 +4,8 @@
 //! - [`MachineSpec`]: throughput, latency, queues and clocks of the units of the block diagram.
 //! - [`DemandBuilder`] and [`ServiceDemand`]: cycles that a packet needs at each station, the same for all
 //!   levels.
-//! - [`Level`] and [`FrameClock`]: the levels, and a clock for any of them; [`AccuracyWarning`]: known
-//!   inaccuracies.
+//! - [`Level`] and [`FrameClock`]: the levels, and a clock for any of them; [`Checked`]: how far a level is off on
+//!   parts of a frame.
 //! - [`stepped`]: the reference, cycle by cycle.
 //! - [`PacketClock`]: a recurrence over packets, with calendars for shared resources.
 //! - [`BoundClock`]: a roofline over segments of the stream, from [`Totals`] gathered while packets arrive.
@@ -30,6 +30,7 @@
 //! ```
 
 mod bound;
+mod check;
 mod chips;
 mod clock;
 mod demand;
@@ -43,12 +44,13 @@ pub mod streams;
 
 use activity::{LineAccess, Packet};
 use serde::{Deserialize, Serialize};
-use warnings::{Code, Warning};
 
+use check::Slices;
 use packet::MAX_CYCLES;
 use stepped::{Stalled, StepOptions, Stream};
 
 pub use bound::{BoundClock, Totals, bound};
+pub use check::Checked;
 pub use clock::{Clocks, Time};
 pub use demand::{CLIENTS, CYCLE, DemandBuilder, ServiceDemand, Station, Work};
 pub use draws::{DrawSpan, PassTime};
@@ -75,38 +77,13 @@ pub struct Timed {
     pub unit_cycles: u64,
     /// Packets of the stream.
     pub packets: u64,
-    /// Row time of the busiest memory bank over the busy time of the busiest unit; `None` at the level
-    /// `stepped`. Levels differ most where it is large, as they order lines differently.
-    pub rows: Option<f64>,
-    /// Share of the frame for which a memory bank opens rows that it may not have to: lines of the same row
-    /// that may wait side by side, in an order that is not known; only at the level `packet`.
-    pub disputed: Option<f64>,
-    /// Utilization of memory whose channels queue less than the time in which a row closes and another one
-    /// opens; `None` if they queue more, and at the level `stepped`.
-    pub short_queues: Option<f64>,
-    /// Share of the frame that batches and passes may overlap, the longest packet of each; only at the level `bound`.
-    pub overlap: Option<f64>,
+    /// What the check of the level found; only from [`FrameClock::checked`].
+    pub checked: Option<Checked>,
     /// The passes of the frame, by number.
     pub passes: Vec<PassTime>,
     /// When the frame spent its time on which draw, in order; empty at the level `bound`, and at `packet` if
     /// draws take turns very often.
     pub spans: Vec<DrawSpan>,
-}
-
-/// Utilization of memory, if a queue of its channels holds less than the time in which a row closes and
-/// another one opens.
-fn short_queues(dram: &DramSpec, timeline: &activity::Timeline) -> Option<f64> {
-    let writes = dram.write_queue.map_or(u32::MAX, |queue| queue.get());
-    let queued = dram.queue.get().min(writes) * dram.burst_cycles.get();
-    let busy_ps = timeline.busy_ps()[activity::Unit::Dram as usize];
-    let is_short = queued < dram.precharge_cycles.get() + dram.activate_cycles.get();
-    is_short.then(|| busy_ps as f64 / timeline.duration_ps.max(1) as f64)
-}
-
-/// `length_ps` over the busy time of the busiest unit.
-fn ratio_to_busiest(length_ps: u64, timeline: &activity::Timeline) -> f64 {
-    let busiest = timeline.busy_ps().into_iter().max().unwrap_or(0);
-    length_ps as f64 / busiest.max(1) as f64
 }
 
 /// Timing level.
@@ -166,6 +143,8 @@ pub struct Machine<'a> {
 pub struct FrameClock<'a> {
     machine: Machine<'a>,
     state: State,
+    /// The level to check, and what it is checked on.
+    check: Option<(Level, Slices)>,
 }
 
 enum State {
@@ -185,11 +164,20 @@ impl<'a> FrameClock<'a> {
             Level::Packet => State::Packet(Box::new(PacketClock::new(units, clocks, recorder))),
             Level::Bound => State::Bound(Box::new(BoundClock::new(units, clocks, recorder))),
         };
-        Self { machine, state }
+        Self { machine, state, check: None }
+    }
+
+    /// The same, and the level is checked: [`Timed::checked`]. `stepped` is the reference and needs no check.
+    pub fn checked(level: Level, machine: Machine<'a>, recorder: Recorder) -> Self {
+        let check = (level != Level::Stepped).then(|| (level, Slices::new()));
+        Self { check, ..Self::new(level, machine, recorder) }
     }
 
     /// Add the next packet of the stream and the lines it requests from the L2.
     pub fn push(&mut self, packet: &Packet, lines: &[LineAccess]) {
+        if let Some((_, slices)) = &mut self.check {
+            slices.push(packet, lines);
+        }
         match &mut self.state {
             State::Stepped(state) => state.1.push(&mut state.0, packet, lines),
             State::Packet(clock) => clock.push(packet, lines),
@@ -208,143 +196,18 @@ impl<'a> FrameClock<'a> {
     /// # Errors
     /// [`TimingError::Stalled`] is an error of the model; [`TimingError::TooLong`] limits the level `packet`.
     pub fn finish(self) -> Result<Timed, TimingError> {
-        Ok(match self.state {
+        let Self { machine, state, check } = self;
+        let timed = match state {
             State::Stepped(state) => {
                 let (builder, stream, recorder) = *state;
-                stepped::run(
-                    self.machine.units,
-                    self.machine.clocks,
-                    &builder,
-                    &stream,
-                    recorder,
-                    &StepOptions::default(),
-                )?
+                let options = StepOptions::default();
+                stepped::run(machine.units, machine.clocks, &builder, &stream, recorder, &options)?
             }
             State::Packet(clock) if clock.is_too_long() => return Err(TimingError::TooLong),
             State::Packet(clock) => clock.finish(),
             State::Bound(clock) => clock.finish(),
-        })
-    }
-}
-
-/// Reason why the time of a frame may be inaccurate at its level.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum AccuracyWarning {
-    /// Share of the frame for which a memory bank opens rows in an order that `packet` and `bound` do not
-    /// know: those that other lines may have open at `packet`, all at `bound`, there over the busy time of
-    /// the busiest unit.
-    MemoryRows(f64),
-    /// Utilization of memory whose queues are shorter than the opening of a row: which lines are in the queue
-    /// of a channel, and which wait in front of it, decides how well rows and buses are used.
-    MemoryQueue(f64),
-    /// Share of the frame that batches and passes may overlap. `bound` does not know for how much of it they do.
-    BatchOverlap(f64),
-    /// Core cycles per packet. At `bound`, short packets wait for one unit each, so no unit is busy for long.
-    ShortPackets(f64),
-}
-
-/// Smallest disputed share of the frame that gives a warning at `packet`, and smallest row time over busy
-/// time at `bound`.
-const MIN_ROWS: f64 = 0.2;
-/// Least utilization of memory with short queues that gives a warning at `packet`, and at `bound`.
-const MIN_QUEUED: [f64; 2] = [0.2, 0.15];
-/// Smallest share of the frame that batches and passes may overlap that gives a warning: half of it is what
-/// `bound` takes, and any part may be right.
-const MIN_OVERLAP: f64 = 0.16;
-/// Packets with fewer cycles than this give a warning.
-const MIN_PACKET_CYCLES: f64 = 2.0;
-
-impl AccuracyWarning {
-    /// All warnings about a frame at `level`.
-    pub fn all(level: Level, timed: &Timed) -> Vec<Self> {
-        let is_bound = level == Level::Bound;
-        let rows = if is_bound { timed.rows } else { timed.disputed };
-        let rows = rows.filter(|&share| share >= MIN_ROWS).map(Self::MemoryRows);
-        let least = MIN_QUEUED[usize::from(is_bound)];
-        let queues = timed.short_queues.filter(|&share| share >= least).map(Self::MemoryQueue);
-        let overlap = timed.overlap.filter(|&share| share >= MIN_OVERLAP).map(Self::BatchOverlap);
-        let cycles = timed.cycles as f64 / timed.packets.max(1) as f64;
-        let short = (is_bound && cycles < MIN_PACKET_CYCLES).then_some(Self::ShortPackets(cycles));
-        [rows, queues, overlap, short].into_iter().flatten().collect()
-    }
-
-    /// Warning code.
-    pub const fn code(self) -> Code {
-        match self {
-            Self::MemoryRows(_) => Code::MemoryRows,
-            Self::MemoryQueue(_) => Code::MemoryQueue,
-            Self::BatchOverlap(_) => Code::BatchOverlap,
-            Self::ShortPackets(_) => Code::ShortPackets,
-        }
-    }
-
-    /// Severity, comparable among warnings of one kind; larger is worse.
-    pub fn extent(self) -> f64 {
-        match self {
-            Self::MemoryRows(share) | Self::MemoryQueue(share) | Self::BatchOverlap(share) => share,
-            Self::ShortPackets(cycles) => -cycles,
-        }
-    }
-
-    /// Level that has no such warning.
-    const fn better(self) -> Level {
-        match self {
-            Self::MemoryRows(_) | Self::MemoryQueue(_) => Level::Stepped,
-            Self::BatchOverlap(_) | Self::ShortPackets(_) => Level::Packet,
-        }
-    }
-
-    /// What can be done at `level`, which the user requested, or which was `chosen` with this relative error on a
-    /// probe.
-    fn remedy(self, level: Level, chosen: Option<f64>) -> String {
-        let (name, better) = (level.name(), self.better().name());
-        match chosen {
-            None => format!("use --timing {better}, or let --accuracy choose"),
-            Some(error) => format!(
-                "`{name}` was chosen with an error of {:.2} % on a probe; give a smaller --accuracy, or --timing {better}",
-                1e2 * error
-            ),
-        }
-    }
-
-    /// Warning about a frame at a level that the user requested, or that was `chosen` with this relative error on
-    /// a probe.
-    pub fn warning(self, frame: u32, level: Level, chosen: Option<f64>) -> Warning {
-        let (name, remedy) = (level.name(), self.remedy(level, chosen));
-        match self {
-            Self::MemoryRows(share) => Warning::new(
-                Code::MemoryRows,
-                format!(
-                    "a bank of memory opens rows for {:.0} % of {} in frame {frame} that lines of the same row may have open: \
-                     times at `{name}` may be far off, as what counts is which lines wait side by side; {remedy}",
-                    100.0 * share,
-                    if level == Level::Bound { "the busy time" } else { "the time" },
-                ),
-            ),
-            Self::MemoryQueue(share) => Warning::new(
-                Code::MemoryQueue,
-                format!(
-                    "memory is busy for {:.0} % of frame {frame}, and a queue of a channel is shorter than the time in which a row \
-                     opens: times at `{name}` may be a tenth too short or more, as lines wait in front of full queues in an order \
-                     that it does not know; use a longer `dram.queue` (or `dram.write_queue`); {remedy}",
-                    100.0 * share,
-                ),
-            ),
-            Self::BatchOverlap(share) => Warning::new(
-                Code::BatchOverlap,
-                format!(
-                    "the longest packets of the batches and passes of frame {frame} take {:.0} % of it: times at `{name}` may be \
-                     off by half of that, as it does not know how far batches overlap; {remedy}",
-                    100.0 * share,
-                ),
-            ),
-            Self::ShortPackets(cycles) => Warning::new(
-                Code::ShortPackets,
-                format!(
-                    "a packet comes every {cycles:.1} cycles of frame {frame}: with packets so short `{name}` is up to a \
-                     quarter too short; {remedy}"
-                ),
-            ),
-        }
+        };
+        let check = check.map(|(level, slices)| slices.check(level, machine, timed.cycles)).transpose()?;
+        Ok(Timed { checked: check.flatten(), ..timed })
     }
 }

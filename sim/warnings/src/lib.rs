@@ -116,17 +116,8 @@ codes! {
     CoordinatesCoarse = "coordinates-coarse" in Simulator,
     /// Triangles in view and in front of the camera are nearer than its near plane, as a whole or in part.
     NearPlaneCuts = "near-plane-cuts" in Simulator,
-    /// A memory bank opens rows in an order that the level does not know: at `packet` for at least a fifth of
-    /// the time rows that other lines may have open, at `bound` any rows for at least a fifth of the busiest
-    /// unit's time.
-    MemoryRows = "memory-rows" in Simulator,
-    /// The queue of a memory channel is shorter than the opening of a row, and memory is busy for a fifth of
-    /// the frame or more, at `bound` for 15 %.
-    MemoryQueue = "memory-queue" in Simulator,
-    /// At `bound`: the longest packets of batches and passes take 16 % of the frame or more.
-    BatchOverlap = "batch-overlap" in Simulator,
-    /// At `bound`: a packet arrives every two cycles or faster.
-    ShortPackets = "short-packets" in Simulator,
+    /// The timing level is 8 % or more off `stepped` on parts of a frame.
+    TimingInaccurate = "timing-inaccurate" in Simulator,
     /// An interval of `--timing sampled` is wider than 5 % of its value either way.
     WidePredictionInterval = "wide-prediction-interval" in Simulator,
     /// A preview of `--timing sampled` takes half of a frame's cycles or more.

@@ -1,7 +1,5 @@
 //! A bank of memory at the level `packet`: the rows that are open, one after another in time.
 
-use std::collections::HashMap;
-
 use super::Span;
 use super::calendar::{Calendar, Turn};
 use crate::clock::Time;
@@ -13,8 +11,6 @@ pub(super) struct Lines {
     pub is_write: bool,
     pub count: u32,
     pub turn: Turn,
-    /// When the first comes to memory.
-    pub came: Time,
     /// When the first and the last enter the queue of the channel.
     pub seen: Span,
 }
@@ -47,10 +43,6 @@ impl OpenRow {
 pub(super) struct Bank {
     pub time: Calendar,
     pub rows: Box<[OpenRow]>,
-    /// When the last line of each row before these was issued.
-    former: HashMap<u32, Time>,
-    /// Time for rows that may not have to be opened.
-    pub disputed: Time,
     /// The latest row that was read and that was written, and lines of the channel up to then.
     kinds: [(u32, u64); 2],
 }
@@ -72,13 +64,7 @@ pub(super) struct RowUse {
 impl Bank {
     /// A bank that remembers `rows` rows.
     pub fn new(time: Calendar, rows: usize) -> Self {
-        Self {
-            time,
-            rows: vec![OpenRow::NONE; rows].into(),
-            former: HashMap::new(),
-            disputed: 0,
-            kinds: [(u32::MAX, 0); 2],
-        }
+        Self { time, rows: vec![OpenRow::NONE; rows].into(), kinds: [(u32::MAX, 0); 2] }
     }
 
     /// When the row at a place is open for lines that join it and take `work` on the bus. Rows that are
@@ -90,18 +76,6 @@ impl Bank {
         }
         // A row that is requested later in time, though earlier in the stream, does not keep the line waiting.
         if open.since <= seen { open.opened } else { seen }
-    }
-
-    /// Count the time `opens` of a row that lines open again which came at `came`, if these and the lines
-    /// before of that row may have waited side by side. In what order lines leave that wait at ports and in
-    /// the queue of the channel is not known here, as those of a client ahead of others come late in the
-    /// stream. So two lines may meet if the second comes no later after the first than all those take,
-    /// `longest_way`.
-    pub fn dispute(&mut self, row: u32, came: Time, longest_way: Time, opens: Time) {
-        let known = self.rows.iter().filter(|open| open.row == row).map(|open| open.until).max();
-        if known.max(self.former.get(&row).copied()).is_some_and(|last| came < last + longest_way) {
-            self.disputed += opens;
-        }
     }
 
     /// Note lines of a kind and a row. Whether lines of the other kind, not far from them, are of another row.
@@ -157,10 +131,6 @@ impl Bank {
             return;
         }
         let closes = at.checked_sub(1).map_or(Time::MAX, |next| self.rows[next].opened);
-        if let Some(oldest) = self.rows.last().filter(|oldest| **oldest != OpenRow::NONE) {
-            let until = self.former.entry(oldest.row).or_default();
-            *until = oldest.until.max(*until);
-        }
         let last = self.rows.len() - 1;
         self.rows.copy_within(at..last, at + 1);
         self.rows[at] = OpenRow { row, since: seen, opened, until: issued, may_close, closes, joined: 0 };
@@ -170,19 +140,6 @@ impl Bank {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn a_row_that_opens_again_is_disputed_if_its_lines_may_have_met() {
-        let mut bank = Bank::new(Calendar::new(16, 1), 2);
-        let used =
-            |row, issued| RowUse { row, seen: issued, opened: issued, issued, may_close: issued, work: 1 };
-        [(7, 10), (8, 20), (9, 30)].into_iter().for_each(|(row, issued)| bank.note(used(row, issued), None));
-        // Row 7 is not among the two remembered any more; row 6 never was open.
-        for (row, came, disputed) in [(7, 59, 5), (7, 60, 5), (9, 60, 10), (6, 0, 10)] {
-            bank.dispute(row, came, 50, 5);
-            assert_eq!(bank.disputed, disputed, "row {row} at {came}");
-        }
-    }
 
     #[test]
     fn a_line_joins_others_of_its_row_until_it_closes() {

@@ -11,7 +11,6 @@ use super::bank::{Bank, Lines, OpenRow, RowUse};
 use super::calendar::{Calendar, Pauses};
 use crate::chips::{AddressMap, ChipTimes, RowAddress, TurnPolicy};
 use crate::clock::{Clocks, Time};
-use crate::demand::CLIENTS;
 use crate::spec::MachineSpec;
 
 /// Lines per slot of a bus calendar. The bus idles while a row opens; longer slots would give that idle time
@@ -182,7 +181,7 @@ impl Channel {
     /// Open a row for lines that join none. Returns when it is open, and from when on the bus may idle for it.
     fn open(
         &mut self,
-        RowAddress { bank, row, .. }: RowAddress,
+        RowAddress { bank, .. }: RowAddress,
         lines: &Lines,
         rules: &Rules,
         blocks_bus: bool,
@@ -191,7 +190,6 @@ impl Channel {
         let (kind, seen) = (usize::from(lines.is_write), lines.seen.from);
         let rank = self.rank_of(bank);
         let bank = &mut self.banks[bank];
-        bank.dispute(row, lines.came, rules.longest_way, times.activate[kind] + times.precharge);
         let at = bank.place(seen);
         let before = bank.rows[at];
         let closing = if before == OpenRow::NONE { 0 } else { times.precharge };
@@ -275,10 +273,8 @@ struct Rules {
     turns: TurnPolicy,
     /// Lines that wait in front of a channel.
     queue: u64,
-    /// Time of a full queue of lines of one bank, each of another row, and of all lines that can wait in
-    /// front of a channel.
+    /// Time of a full queue of lines of one bank, each of another row.
     longest_wait: Time,
-    longest_way: Time,
 }
 
 /// All channels.
@@ -310,7 +306,6 @@ impl Dram {
         let alone = ranks.first().filter(|_| ranks.len() == 1).and_then(|rank| rank.refresh);
         let reopening = alone.map(|pauses| Pauses { length: pauses.length + times.activate[0], ..pauses });
         let longest_line = times.burst.max(times.row_cycle(0).max(times.row_cycle(1)));
-        let in_ports = CLIENTS.len() as Time * Time::from(machine.l2.queue.get());
         let remembered = (RECENT_GROUPS * queue as usize).min(MAX_RECENT_GROUPS);
         let banks = ranks.iter().flat_map(|rank| vec![bank(rank); banks]).collect();
         let channel = Channel::new(bus.with_pauses(reopening), ranks, banks, remembered);
@@ -322,7 +317,6 @@ impl Dram {
                 times,
                 queue,
                 longest_wait: longest_line * queue,
-                longest_way: longest_line * (queue + in_ports),
             },
             end: 0,
         }
@@ -367,19 +361,6 @@ impl Dram {
     /// End of the last transfer.
     pub fn ends_at(&self) -> Time {
         self.end
-    }
-
-    /// Row time of the busiest bank.
-    pub fn rows(&self) -> Time {
-        let banks = self.channels.iter().flat_map(|channel| &channel.banks);
-        let busy = |bank: &Bank| bank.time.slots().map(|(_, _, used, _)| used).sum();
-        banks.map(busy).max().unwrap_or(0)
-    }
-
-    /// Time of the bank with most of it for rows that may not have to be opened.
-    pub fn disputed(&self) -> Time {
-        let banks = self.channels.iter().flat_map(|channel| &channel.banks);
-        banks.map(|bank| bank.disputed).max().unwrap_or(0)
     }
 
     /// Bus calendars of all channels.

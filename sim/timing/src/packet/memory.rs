@@ -197,14 +197,12 @@ impl Memory {
         }
         // What the queues of the channels do not hold waits in front of the level above.
         let seen = Span { from: accepted.from + period, to: accepted.to + period };
-        let came = seen.from;
         let seen = self.dram.admits(head, count, seen);
         accepted = Span { from: seen.from - period, to: seen.to - period };
         fetched.moved = fetched.moved.max(seen.to);
         for line in head.moved() {
             let is_read = head.fetched() == Some(line);
-            let moved =
-                self.dram.transfer(&Lines { first: line, is_write: !is_read, count, turn, came, seen });
+            let moved = self.dram.transfer(&Lines { first: line, is_write: !is_read, count, turn, seen });
             fetched.moved = fetched.moved.max(moved);
             if is_read {
                 let latency = self.dram.latency() + latency + self.latency;
@@ -243,16 +241,6 @@ impl Memory {
     /// Calendars of the levels below the L2.
     pub fn levels(&self) -> impl Iterator<Item = (Unit, &Calendar)> {
         self.levels.calendars()
-    }
-
-    /// Row time of the busiest bank.
-    pub fn rows(&self) -> Time {
-        self.dram.rows()
-    }
-
-    /// Time of the bank with most of it for rows that may not have to be opened.
-    pub fn disputed(&self) -> Time {
-        self.dram.disputed()
     }
 
     /// Bus calendars of all channels.

@@ -453,9 +453,6 @@ impl PacketClock {
             tally::write_calendar(&mut recorder, &clocks, Unit::Dram, bus, channels, end_ps);
         }
         let timeline = recorder.finish();
-        let rows = crate::ratio_to_busiest(clocks.ps(memory.rows()), &timeline);
-        let disputed = clocks.ps(memory.disputed()) as f64 / timeline.duration_ps.max(1) as f64;
-        let short_queues = crate::short_queues(&machine.dram, &timeline);
         let (parts, spans) = draws.finish(&clocks, timeline.duration_ps);
         Timed {
             passes: passes.finish(&machine, &clocks, timeline.duration_ps, &parts),
@@ -465,10 +462,7 @@ impl PacketClock {
             stalls: None,
             unit_cycles: 0,
             packets,
-            rows: Some(rows),
-            disputed: Some(disputed),
-            short_queues,
-            overlap: None,
+            checked: None,
         }
     }
 }

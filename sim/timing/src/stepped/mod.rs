@@ -239,10 +239,7 @@ impl<'a> Machine<'a> {
             stalls: Some(self.meter.stalls),
             unit_cycles: self.visited,
             packets: stream.demands.len() as u64,
-            rows: None,
-            disputed: None,
-            short_queues: None,
-            overlap: None,
+            checked: None,
         })
     }
 

@@ -4,9 +4,7 @@ use activity::{Event, LineAccess, LineKind, Unit};
 use timing::stepped::StepOptions;
 use timing::{BinsSpec, Clocks, MachineSpec, RefreshSpec, Timed};
 
-use crate::common::{
-    Packets, bound_level, clocks, cycles, packet_level, plain, size, stepped, stepped_as, tile,
-};
+use crate::common::{Packets, bound_level, cycles, packet_level, plain, size, stepped, stepped_as, tile};
 
 /// A machine that only memory limits: a bus that takes 8 cycles a line, one bank of one row.
 fn machine() -> MachineSpec {
@@ -127,18 +125,6 @@ fn a_bus_turns_no_more_than_once_each_way_for_two_chunks() {
         let [stepped, packet, bound] = cycles(&machine, &packets);
         let off = |found: u64| (found as f64 / stepped as f64 - 1.0).abs();
         assert!(off(packet) < 0.08, "{interleave_bytes}: {stepped} {packet} {bound}");
-    }
-}
-
-#[test]
-fn a_queue_of_writes_shorter_than_the_opening_of_a_row_counts_as_short() {
-    let mut machine = machine();
-    let is_short =
-        |machine: &MachineSpec| packet_level(machine, clocks(), &reads(64, 1)).short_queues.is_some();
-    assert!(!is_short(&machine));
-    for (places, expected) in [(1, true), (2, false)] {
-        machine.dram.write_queue = Some(size(places));
-        assert_eq!(is_short(&machine), expected, "{places}");
     }
 }
 

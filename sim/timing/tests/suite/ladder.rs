@@ -97,7 +97,7 @@ fn random_rows(rows: u64, [channels, banks, queue, in_flight]: [u32; 4]) -> (tim
 
 /// A queue from which lines of any row may leave first, so that rows of one bank take turns.
 #[test]
-fn disputed_rows_are_near_the_reference() {
+fn rows_that_take_turns_are_near_the_reference() {
     let sizes = [[1, 8, 16, 32], [2, 8, 16, 4], [2, 8, 32, 32], [2, 8, 8, 32], [4, 8, 16, 32], [2, 4, 16, 4]];
     let mut errors = Vec::new();
     for size in sizes {

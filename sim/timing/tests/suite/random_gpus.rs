@@ -1,7 +1,7 @@
 //! GPUs drawn at random: how far `packet` is off on the streams that challenge it.
 
 use timing::streams::{Failure, failures};
-use timing::{AccuracyWarning, Level, Timed};
+use timing::{Checked, Timed};
 
 use crate::common::size;
 use crate::rates::Gpu;
@@ -65,8 +65,7 @@ fn drawn(seed: u64) -> Gpu {
 }
 
 /// Streams by GPU on which `packet` is more than 8 % off and does not warn: what was found of 120.
-const FAR: [(u64, &str); 3] =
-    [(2, "groups that stream"), (8, "passes in a chain"), (8, "atomics on one word")];
+const FAR: [(u64, &str); 2] = [(2, "row after row"), (8, "passes in a chain")];
 
 /// What `packet` and `bound` say of a stream on a GPU.
 struct Pair {
@@ -84,16 +83,11 @@ fn pairs(seed: u64) -> Vec<Pair> {
     let cases = failures(&gpu.units, BATCH).into_iter().filter(|case| case.name != "queues of one");
     let pair = |case: Failure| {
         let [truth, packet, bound] = gpu.run(&case.units, &case.packets);
-        let judged = |level, timed: &Timed| {
+        let judged = |timed: &Timed| {
             let percent = 100.0 * (timed.cycles as f64 / truth.cycles as f64 - 1.0);
-            (percent, !AccuracyWarning::all(level, timed).is_empty())
+            (percent, timed.checked.is_some_and(Checked::is_far))
         };
-        let pair = Pair {
-            seed,
-            name: case.name,
-            packet: judged(Level::Packet, &packet),
-            bound: judged(Level::Bound, &bound),
-        };
+        let pair = Pair { seed, name: case.name, packet: judged(&packet), bound: judged(&bound) };
         let words =
             |(percent, warns): (f64, bool)| format!("{percent:+.1} %{}", if warns { ", warns" } else { "" });
         println!("{seed} {}: packet {}; bound {}", pair.name, words(pair.packet), words(pair.bound));
