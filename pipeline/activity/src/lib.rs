@@ -31,8 +31,8 @@ mod stream;
 
 pub use events::{Event, Unit};
 pub use packet::{
-    Bin, Counts, LEVELS, LevelRequests, LineAccess, LineKind, Packet, PacketCounts, PacketKind, Timeline,
-    Waits,
+    Bin, Counts, LEVELS, LevelRequests, LineAccess, LineKind, Packet, PacketBuffer, PacketCounts, PacketKind,
+    Timeline, Waits,
 };
 pub use spec::{Bounded, OutOfBounds};
 pub use stream::{PacketStream, StreamError, StreamWriter};

@@ -376,6 +376,61 @@ impl Timeline {
     }
 }
 
+/// Packets in order with their lines.
+#[derive(Clone, Debug, Default)]
+pub struct PacketBuffer {
+    /// Each packet, and where its lines end.
+    packets: Vec<(Packet, usize)>,
+    lines: Vec<LineAccess>,
+}
+
+impl PacketBuffer {
+    /// Add a packet with its lines.
+    pub fn push(&mut self, packet: &Packet, lines: &[LineAccess]) {
+        self.lines.extend_from_slice(lines);
+        self.packets.push((*packet, self.lines.len()));
+    }
+
+    /// Number of packets.
+    pub fn len(&self) -> usize {
+        self.packets.len()
+    }
+
+    /// Whether there are no packets.
+    pub fn is_empty(&self) -> bool {
+        self.packets.is_empty()
+    }
+
+    /// Number of lines of all packets.
+    pub fn line_count(&self) -> usize {
+        self.lines.len()
+    }
+
+    /// Each packet with its lines.
+    pub fn iter(&self) -> impl Iterator<Item = (&Packet, &[LineAccess])> {
+        let mut first = 0;
+        self.packets.iter().map(move |(packet, end)| {
+            let lines = &self.lines[first..*end];
+            first = *end;
+            (packet, lines)
+        })
+    }
+
+    /// Remove all packets.
+    pub fn clear(&mut self) {
+        self.packets.clear();
+        self.lines.clear();
+    }
+}
+
+impl<'a> FromIterator<(&'a Packet, &'a [LineAccess])> for PacketBuffer {
+    fn from_iter<I: IntoIterator<Item = (&'a Packet, &'a [LineAccess])>>(packets: I) -> Self {
+        let mut all = Self::default();
+        packets.into_iter().for_each(|(packet, lines)| all.push(packet, lines));
+        all
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

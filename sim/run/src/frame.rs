@@ -15,7 +15,7 @@ use pipeline::frame::HeatMap;
 use pipeline::{FrameReport, Gpu, Viewport};
 use power_model::{FramePower, PowerModel};
 use rayon::prelude::*;
-use timing::{AccuracyWarning, FrameClock, Level, Recorder, Timed, TimingError};
+use timing::{FrameClock, Level, Recorder, Timed, TimingError};
 use warnings::Warning;
 use workloads::job::{Drawn, Fact, ReadyFrame};
 use workloads::{Fingerprint, Job, Regime};
@@ -154,8 +154,8 @@ pub(crate) fn draw<'a>(
 }
 
 impl DrawnFrame {
-    /// The frame with its time at `level`, and with the power that `model` gives it.
-    pub fn powered(self, level: Level, timed: &Timed, model: &PowerModel) -> Result<RunFrame, RunError> {
+    /// The frame with its time, and with the power that `model` gives it.
+    pub fn powered(self, timed: &Timed, model: &PowerModel) -> Result<RunFrame, RunError> {
         let Self { number, report, moving, lens, facts, warnings, regime } = self;
         let timeline = &timed.timeline;
         let power = model.frame(timeline).map_err(|source| RunError::Timeline { frame: number, source })?;
@@ -178,7 +178,7 @@ impl DrawnFrame {
                 warnings,
                 regime,
                 stalls: timed.stalls.clone(),
-                accuracy: AccuracyWarning::all(level, timed),
+                checked: timed.checked,
             })),
         })
     }
@@ -186,7 +186,7 @@ impl DrawnFrame {
 
 fn simulate_frame(plan: &Plan, number: u32, max_bins: usize) -> Result<(RunFrame, Pictures), RunError> {
     let level = plan.options.timing.ok_or_else(not_timed)?;
-    let mut clock = FrameClock::new(level, plan.gpu.machine()?, Recorder::new(BIN_PS, max_bins));
+    let mut clock = FrameClock::checked(level, plan.gpu.machine()?, Recorder::new(BIN_PS, max_bins));
     let stop = Cell::new(false);
     let emit = |packet: &_, lines: &_| {
         clock.push(packet, lines);
@@ -197,7 +197,7 @@ fn simulate_frame(plan: &Plan, number: u32, max_bins: usize) -> Result<(RunFrame
         return Err(TimingError::TooLong.into());
     }
     let (frame, pictures) = drawn?;
-    Ok((frame.powered(level, &clock.finish()?, &plan.model)?, pictures))
+    Ok((frame.powered(&clock.finish()?, &plan.model)?, pictures))
 }
 
 /// Error of simulating a run without a timing level.

@@ -15,7 +15,7 @@ use pipeline::FrameReport;
 use power_model::FramePower;
 use serde::{Deserialize, Serialize};
 use timing::sampled::Interval;
-use timing::{AccuracyWarning, DrawSpan, Level, PassTime, Stalls};
+use timing::{Checked, DrawSpan, Level, PassTime, Stalls};
 use warnings::Warning;
 use workloads::Regime;
 use workloads::job::Fact;
@@ -71,8 +71,8 @@ pub struct Observed {
     pub regime: Regime,
     /// Stall reasons, if the timing level records them.
     pub stalls: Option<Stalls>,
-    /// Accuracy warnings of the timing level.
-    pub accuracy: Vec<AccuracyWarning>,
+    /// How far the timing level is off on parts of the frame; `None` at `stepped`.
+    pub checked: Option<Checked>,
 }
 
 impl RunFrame {
@@ -319,7 +319,7 @@ const TABLE: &str = include_str!("../stated_errors.csv");
 /// Share of runs whose error is within the stated one.
 pub const CONFIDENCE: f64 = 0.95;
 
-/// Stated error of a run. Infinite without a bound, as `null` in JSON.
+/// Stated error of a run, as a factor less one.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct StatedError {
     /// Of cycles.
@@ -328,13 +328,10 @@ pub struct StatedError {
     pub energy: f64,
 }
 
-/// A row of the table.
+/// A row of the table: what is added to the error that the check of a frame found.
 #[derive(Clone, Copy, Debug, Deserialize)]
 struct Row {
     level: Level,
-    warns: bool,
-    #[cfg(test)]
-    runs: u32,
     cycles: f64,
     energy: f64,
 }
@@ -345,16 +342,11 @@ fn table() -> &'static [Row] {
 }
 
 impl StatedError {
-    /// Without a bound.
-    const UNKNOWN: Self = Self { cycles: f64::INFINITY, energy: f64::INFINITY };
-
-    /// Stated error of a frame at a level, with or without accuracy warnings.
-    pub fn at(level: Level, warns: bool) -> Self {
-        if level == Level::Stepped {
-            return Self::default();
-        }
-        let row = table().iter().find(|row| (row.level, row.warns) == (level, warns));
-        row.map_or(Self::UNKNOWN, |row| Self { cycles: row.cycles, energy: row.energy })
+    /// Stated error of a frame at a level whose check found the relative error `checked`.
+    pub fn of(level: Level, checked: f64) -> Self {
+        let found = error_size(libm::log1p(checked));
+        let row = table().iter().find(|row| row.level == level);
+        row.map_or_else(Self::default, |row| Self { cycles: found + row.cycles, energy: found + row.energy })
     }
 
     /// Stated error of the sum over `frames`: the mean of those of simulated frames, by time, as errors of
@@ -362,8 +354,9 @@ impl StatedError {
     pub fn of_frames<'a>(level: Level, frames: impl IntoIterator<Item = &'a RunFrame>) -> Self {
         let (mut sum, mut time_s) = (Self::default(), 0.0);
         for frame in frames {
-            let Some(Observed { accuracy, .. }) = frame.observed() else { continue };
-            let (of, frame_s) = (Self::at(level, !accuracy.is_empty()), frame.power.duration_s());
+            let Some(Observed { checked, .. }) = frame.observed() else { continue };
+            let found = checked.map_or(0.0, |checked| checked.error);
+            let (of, frame_s) = (Self::of(level, found), frame.power.duration_s());
             sum = Self { cycles: sum.cycles + of.cycles * frame_s, energy: sum.energy + of.energy * frame_s };
             time_s += frame_s;
         }
@@ -379,12 +372,13 @@ impl StatedError {
 
     /// A line for the terminal and the report.
     pub fn line(&self) -> String {
-        let percent = |error: f64| match error.is_finite() {
-            true => format!("{:.1} %", 100.0 * error),
-            false => "unknown".to_owned(),
-        };
-        format!("cycles {}, energy {}", percent(self.cycles), percent(self.energy))
+        format!("cycles {:.1} %, energy {:.1} %", 100.0 * self.cycles, 100.0 * self.energy)
     }
+}
+
+/// Size of an error from the logarithm of a ratio: 0.05 for 1.05 and for 1/1.05.
+pub fn error_size(log: f64) -> f64 {
+    libm::expm1(log.abs())
 }
 
 #[cfg(test)]
@@ -392,21 +386,18 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_level_has_an_error_with_and_without_warnings() {
-        assert_eq!(StatedError::at(Level::Stepped, false), StatedError::default());
-        for level in [Level::Packet, Level::Bound] {
-            for row in table().iter().filter(|row| row.level == level) {
-                let error = StatedError::at(level, row.warns);
-                // The bound is the n-th of n - 1 runs with fewer than 19, and so none.
-                let is_known = row.runs >= 19;
-                for share in [error.cycles, error.energy] {
-                    assert!(share > 0.0 && share.is_finite() == is_known, "{level:?}: {error:?}");
-                }
-                assert!(is_known || row.warns, "{level:?}: too few runs without a warning");
-            }
+    fn the_error_of_a_frame_is_that_of_its_check_and_a_margin() {
+        assert_eq!(StatedError::of(Level::Stepped, 0.0), StatedError::default());
+        assert_eq!(table().len(), 2);
+        for row in table() {
+            let at = |checked| StatedError::of(row.level, checked);
+            assert_eq!([at(0.0).cycles, at(0.0).energy], [row.cycles, row.energy]);
+            assert!(row.cycles > 0.0 && row.energy > 0.0);
+            // A fifth too short: the truth is a quarter longer.
+            assert!((at(-0.2).cycles - row.cycles - 0.25).abs() < 1e-12);
+            assert!((at(0.25).energy - row.energy - 0.25).abs() < 1e-12);
         }
-        assert!(StatedError::at(Level::Packet, false).cycles < StatedError::at(Level::Bound, false).cycles);
-        assert_eq!(table().len(), 4);
+        assert!(StatedError::of(Level::Packet, 0.0).cycles < StatedError::of(Level::Bound, 0.0).cycles);
     }
 
     #[test]
@@ -414,6 +405,5 @@ mod tests {
         let sum = StatedError { cycles: 0.01, energy: 0.02 }.beside(0.03, 0.05);
         assert!((sum.cycles - 0.04).abs() < 1e-15 && (sum.energy - 0.07).abs() < 1e-15);
         assert_eq!(sum.line(), "cycles 4.0 %, energy 7.0 %");
-        assert_eq!(StatedError::UNKNOWN.line(), "cycles unknown, energy unknown");
     }
 }

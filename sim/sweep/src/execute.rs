@@ -11,6 +11,7 @@ use run::{
     passes_of, warnings_of,
 };
 use serde::{Deserialize, Serialize};
+use warnings::Code;
 
 use crate::setting::{self, Setting};
 
@@ -182,7 +183,7 @@ pub fn measured(plan: &Plan, distinct: Vec<RunFrame>, groups: &[usize]) -> Resul
     let area = area_mm2(plan);
     let bytes = |event: Event| counts.get(event).unwrap_or(0);
     let [low_j, high_j] = energy_ends(plan, frames)?;
-    let accuracy = frames.iter().filter_map(|frame| frame.observed()).flat_map(|observed| &observed.accuracy);
+    let checked = frames.iter().filter_map(|frame| frame.observed()?.checked);
     let stated = StatedError::of_frames(plan.options.level(), frames.iter().copied());
     Ok(Measured {
         used: used(plan),
@@ -196,7 +197,7 @@ pub fn measured(plan: &Plan, distinct: Vec<RunFrame>, groups: &[usize]) -> Resul
         nj_per_pixel: frame_j / plan.pixels() as f64 * 1e9,
         dram_bytes: bytes(Event::DramReadBytes) + bytes(Event::DramWriteBytes),
         area_mm2: [area.nominal, area.low, area.high],
-        accuracy_warnings: joined(accuracy.map(|warning| warning.code().name())),
+        accuracy_warnings: joined(checked.filter(|of| of.is_far()).map(|_| Code::TimingInaccurate.name())),
         warnings: joined(warnings_of(plan, &simulated, &paced).iter().map(|warning| warning.code.name())),
         cycles_error: stated.cycles,
         energy_error: stated.energy,

@@ -4,7 +4,7 @@
 //! of short, evenly spread parts of it. Here the parts estimate the error of a faster level: its time of all
 //! slices over that of the reference, minus one. At either level a slice begins on an empty machine.
 
-use activity::{LineAccess, Packet};
+use activity::{LineAccess, Packet, PacketBuffer};
 use warnings::{Code, Warning};
 
 use crate::{FrameClock, Level, Machine, Recorder, TimingError};
@@ -67,38 +67,18 @@ impl Checked {
     }
 }
 
-/// Packets in order, each with the number of its lines.
-#[derive(Clone, Debug, Default)]
-struct Slice {
-    packets: Vec<(Packet, usize)>,
-    lines: Vec<LineAccess>,
-}
-
-impl Slice {
-    fn push(&mut self, packet: &Packet, lines: &[LineAccess]) {
-        if self.packets.len() < SLICE && self.lines.len() < SLICE_LINES {
-            self.packets.push((*packet, lines.len()));
-            self.lines.extend(lines);
-        }
-    }
-
-    /// Core cycles of the first `most` packets.
-    fn cycles(&self, most: usize, level: Level, machine: Machine<'_>) -> Result<u64, TimingError> {
-        // The recorder is not read.
-        let mut clock = FrameClock::new(level, machine, Recorder::new(1 << 40, 2));
-        let mut from = 0;
-        for (packet, lines) in self.packets.iter().take(most) {
-            clock.push(packet, &self.lines[from..from + lines]);
-            from += lines;
-        }
-        Ok(clock.finish()?.cycles)
-    }
+/// Core cycles of the first `most` packets of a slice.
+fn cycles(slice: &PacketBuffer, most: usize, level: Level, machine: Machine<'_>) -> Result<u64, TimingError> {
+    // The recorder is not read.
+    let mut clock = FrameClock::new(level, machine, Recorder::new(1 << 40, 2));
+    slice.iter().take(most).for_each(|(packet, lines)| clock.push(packet, lines));
+    Ok(clock.finish()?.cycles)
 }
 
 /// Evenly spread slices of a stream of unknown length: once there are too many, every other one is dropped.
 #[derive(Clone, Debug)]
 pub(crate) struct Slices {
-    kept: Vec<Slice>,
+    kept: Vec<PacketBuffer>,
     /// Packets from the beginning of a slice to the next.
     every: usize,
     packets: usize,
@@ -115,9 +95,10 @@ impl Slices {
             self.every *= 2;
         }
         if self.packets.is_multiple_of(self.every) {
-            self.kept.push(Slice::default());
+            self.kept.push(PacketBuffer::default());
         }
-        if let Some(slice) = self.kept.last_mut() {
+        let is_open = |slice: &&mut PacketBuffer| slice.len() < SLICE && slice.line_count() < SLICE_LINES;
+        if let Some(slice) = self.kept.last_mut().filter(is_open) {
             slice.push(packet, lines);
         }
         self.packets += 1;
@@ -136,15 +117,15 @@ impl Slices {
         let limit = MIN_CYCLES.max(of_frame / CYCLE_SHARE);
         let (mut packets, mut fast, mut exact) = (0, 0, 0);
         for slice in self.chosen() {
-            let mut most = slice.packets.len();
-            let mut cycles = slice.cycles(most, level, machine)?;
-            if cycles > limit {
-                most = (most as u64 * limit / cycles).max(1) as usize;
-                cycles = slice.cycles(most, level, machine)?;
+            let mut most = slice.len();
+            let mut timed = cycles(slice, most, level, machine)?;
+            if timed > limit {
+                most = (most as u64 * limit / timed).max(1) as usize;
+                timed = cycles(slice, most, level, machine)?;
             }
             packets += most;
-            fast += cycles;
-            exact += slice.cycles(most, Level::Stepped, machine)?;
+            fast += timed;
+            exact += cycles(slice, most, Level::Stepped, machine)?;
         }
         Ok((exact > 0).then(|| Checked {
             packets,
@@ -155,7 +136,7 @@ impl Slices {
 
     /// The slices to time, from the middles of equal parts of the stream. A last slice may be short, so it is
     /// not among them if there are others.
-    fn chosen(&self) -> impl Iterator<Item = &Slice> {
+    fn chosen(&self) -> impl Iterator<Item = &PacketBuffer> {
         let whole = (self.packets / self.every).clamp(1, self.kept.len().max(1));
         let count = (self.packets / SHARE / SLICE).clamp(1, SLICES);
         (0..count).filter_map(move |number| self.kept.get((2 * number + 1) * whole / (2 * count)))
@@ -182,7 +163,8 @@ mod tests {
         let of = |packets| -> Vec<(u32, usize)> {
             let slices = slices(packets);
             assert!(slices.kept.len() <= KEPT);
-            slices.chosen().map(|slice| (slice.packets[0].0.triangle, slice.packets.len())).collect()
+            let first = |slice: &PacketBuffer| slice.iter().next().unwrap().0.triangle;
+            slices.chosen().map(|slice| (first(slice), slice.len())).collect()
         };
         assert_eq!(of(100), [(0, 100)]);
         assert_eq!(of(1100), [(512, 512)]);
@@ -195,10 +177,10 @@ mod tests {
 
     #[test]
     fn a_slice_ends_with_its_lines() {
-        let mut slice = Slice::default();
+        let mut slices = Slices::new();
         let lines = vec![LineAccess::new(Unit::Texture, 0, LineKind::Fetch); SLICE_LINES / 2];
-        (0..9).for_each(|_| slice.push(&Packet::new(PacketKind::Tile, 0), &lines));
-        assert_eq!((slice.packets.len(), slice.lines.len()), (2, SLICE_LINES));
+        (0..9).for_each(|_| slices.push(&Packet::new(PacketKind::Tile, 0), &lines));
+        assert_eq!((slices.kept[0].len(), slices.kept[0].line_count()), (2, SLICE_LINES));
     }
 
     #[test]

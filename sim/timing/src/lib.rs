@@ -42,7 +42,7 @@ mod spec;
 pub mod stepped;
 pub mod streams;
 
-use activity::{LineAccess, Packet};
+use activity::{LineAccess, Packet, PacketBuffer};
 use serde::{Deserialize, Serialize};
 
 use check::Slices;
@@ -183,6 +183,11 @@ impl<'a> FrameClock<'a> {
             State::Packet(clock) => clock.push(packet, lines),
             State::Bound(clock) => clock.push(packet, lines),
         }
+    }
+
+    /// Add packets with their lines.
+    pub fn push_all(&mut self, packets: &PacketBuffer) {
+        packets.iter().for_each(|(packet, lines)| self.push(packet, lines));
     }
 
     /// Whether the frame is already too long for the level, so that [`Self::finish`] returns

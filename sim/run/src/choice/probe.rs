@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-use activity::{Counts, Event};
+use activity::{Counts, Event, PacketBuffer};
 use cpu_time::ThreadTime;
 use output::terminal::Progress;
 use pipeline::PipelineSpec;
@@ -12,7 +12,6 @@ use workloads::job::Reduction;
 
 use super::{Findings, ProbeSummary, with_blur_thresholds};
 use crate::frame::{self, draw_on};
-use crate::recording::PacketBuffer;
 use crate::{Distinct, FrameCost, GpuSpec, Plan, RunError};
 
 /// Largest number of probed frames: the middles of as many equal parts of the run.
@@ -108,7 +107,7 @@ impl ProbedFrame {
         let started = ThreadTime::now();
         let recorder = Recorder::new(crate::BIN_PS, frame::MIN_FRAME_BINS);
         let mut clock = FrameClock::new(level, plan.gpu.machine()?, recorder);
-        self.packets.send(&mut clock);
+        clock.push_all(&self.packets);
         let timed = clock.finish()?;
         let timing_s = started.elapsed().as_secs_f64();
         let power = plan.model.frame(&timed.timeline);

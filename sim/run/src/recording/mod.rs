@@ -4,11 +4,11 @@ mod file;
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use activity::{LineAccess, Packet, PacketStream, StreamError, StreamWriter};
+use activity::{PacketBuffer, PacketStream, StreamError, StreamWriter};
 use output::terminal::Progress;
 use power_model::PowerModel;
 use rayon::prelude::*;
-use timing::{FrameClock, Level, Recorder, Timed};
+use timing::{FrameClock, Recorder, Timed};
 
 pub use file::RecordedRun;
 
@@ -66,7 +66,7 @@ impl DrawnFrames {
         let time = |recorded: &RecordedFrame| {
             let clocks = plans.iter().map(|plan| {
                 let recorder = Recorder::new(BIN_PS, max_bins);
-                Ok(FrameClock::new(plan.options.level(), plan.gpu.machine()?, recorder))
+                Ok(FrameClock::checked(plan.options.level(), plan.gpu.machine()?, recorder))
             });
             let mut clocks = clocks.collect::<Result<Vec<_>, RunError>>()?;
             push_all(&recorded.packets, &mut clocks)?;
@@ -74,7 +74,7 @@ impl DrawnFrames {
         };
         let frames = self.frames.par_iter().map(time).collect::<Result<Vec<_>, RunError>>()?;
         let mut timed: Vec<_> =
-            plans.iter().map(|plan| TimedFrames::new(self, plan.options.level())).collect();
+            plans.iter().map(|_| TimedFrames { recording: self, timed: Vec::new() }).collect();
         for (times, machine) in frames.into_iter().flat_map(|times| times.into_iter().zip(0..)) {
             timed[machine].timed.push(times);
         }
@@ -93,62 +93,29 @@ fn push_all(stream: &PacketStream, clocks: &mut [FrameClock<'_>]) -> Result<(), 
     let mut buffer = PacketBuffer::default();
     stream.replay(|packet, lines| {
         buffer.push(packet, lines);
-        if buffer.packets.len() == PACKETS_IN_TURN {
-            clocks.iter_mut().for_each(|clock| buffer.send(clock));
+        if buffer.len() == PACKETS_IN_TURN {
+            clocks.iter_mut().for_each(|clock| clock.push_all(&buffer));
             buffer.clear();
         }
     })?;
-    clocks.iter_mut().for_each(|clock| buffer.send(clock));
+    clocks.iter_mut().for_each(|clock| clock.push_all(&buffer));
     Ok(())
-}
-
-/// Packets with their lines.
-#[derive(Default)]
-pub(crate) struct PacketBuffer {
-    /// Each packet, and where its lines end.
-    packets: Vec<(Packet, usize)>,
-    lines: Vec<LineAccess>,
-}
-
-impl PacketBuffer {
-    pub fn push(&mut self, packet: &Packet, lines: &[LineAccess]) {
-        self.lines.extend_from_slice(lines);
-        self.packets.push((*packet, self.lines.len()));
-    }
-
-    pub fn send(&self, clock: &mut FrameClock<'_>) {
-        let mut first = 0;
-        for (packet, end) in &self.packets {
-            clock.push(packet, &self.lines[first..*end]);
-            first = *end;
-        }
-    }
-
-    fn clear(&mut self) {
-        self.packets.clear();
-        self.lines.clear();
-    }
 }
 
 /// Frames of a recording with their times on a machine.
 pub struct TimedFrames<'a> {
     recording: &'a DrawnFrames,
     timed: Vec<Timed>,
-    level: Level,
 }
 
-impl<'a> TimedFrames<'a> {
-    const fn new(recording: &'a DrawnFrames, level: Level) -> Self {
-        Self { recording, timed: Vec::new(), level }
-    }
-
+impl TimedFrames<'_> {
     /// The frames with the power that `model` gives them, as from [`frames_of`](crate::frames_of).
     ///
     /// # Errors
     /// If a timeline contradicts itself, which is an error of the timing model.
     pub fn powered(&self, model: &PowerModel) -> Result<Vec<RunFrame>, RunError> {
         let frames = self.recording.frames.iter().zip(&self.timed);
-        frames.map(|(recorded, timed)| recorded.frame.clone().powered(self.level, timed, model)).collect()
+        frames.map(|(recorded, timed)| recorded.frame.clone().powered(timed, model)).collect()
     }
 }
 
@@ -156,6 +123,7 @@ impl<'a> TimedFrames<'a> {
 mod tests {
     use super::*;
     use crate::{RunOptions, frames_of};
+    use timing::Level;
     use workloads::Overrides;
 
     fn plan(gpu: &str, timing: Level) -> Plan {
@@ -187,7 +155,7 @@ mod tests {
                     (&seen.report, &seen.times, &seen.spans),
                     (&again.report, &again.times, &again.spans)
                 );
-                assert_eq!((&seen.stalls, &seen.accuracy), (&again.stalls, &again.accuracy));
+                assert_eq!((&seen.stalls, &seen.checked), (&again.stalls, &again.checked));
             }
         }
     }

@@ -7,13 +7,14 @@ use std::collections::BTreeMap;
 use activity::{Counts, Event};
 use output::table::si;
 use power_model::{PacedFrame, PacedRun};
-use timing::AccuracyWarning;
+use timing::Checked;
 use traces::frames::Flag;
 use warnings::{Code, Warning};
 
 use self::regimes::of_regimes;
 use crate::heat::HeatPicture;
 use crate::measure::MIN_BUSY_SAMPLES;
+use crate::simulated::error_size;
 use crate::{Choice, Measurement, Observed, Plan, RunFrame, Simulated, Verified};
 
 /// All warnings of a run, sorted, without duplicates.
@@ -86,20 +87,13 @@ fn of_frames<'a>(frames: impl ExactSizeIterator<Item = (u32, &'a [Warning])>) ->
     by_code.into_values().map(joined).collect()
 }
 
-/// Accuracy warnings of the timing level: for each code, the frame with the largest extent.
-fn accuracy(plan: &Plan, simulated: &Simulated) -> Vec<Warning> {
-    let mut worst: Vec<(u32, AccuracyWarning)> = Vec::new();
-    let all =
-        simulated.observed().flat_map(|(f, observed)| observed.accuracy.iter().map(|of| (f.index, *of)));
-    for (frame, warning) in all {
-        match worst.iter_mut().find(|(_, known)| known.code() == warning.code()) {
-            Some(known) if known.1.extent() < warning.extent() => *known = (frame, warning),
-            Some(_) => {}
-            None => worst.push((frame, warning)),
-        }
-    }
-    let level = plan.options.level();
-    worst.iter().map(|(frame, warning)| warning.warning(*frame, level, plan.chosen)).collect()
+/// Warning about the frame that the check of the timing level found farthest off.
+fn accuracy(plan: &Plan, simulated: &Simulated) -> Option<Warning> {
+    let checked = simulated.observed().filter_map(|(frame, observed)| Some((frame.index, observed.checked?)));
+    let size = |checked: &Checked| error_size(libm::log1p(checked.error));
+    let (frame, worst) =
+        checked.filter(|(_, of)| of.is_far()).max_by(|(_, a), (_, b)| size(a).total_cmp(&size(b)))?;
+    Some(worst.warning(frame, plan.options.level(), plan.chosen))
 }
 
 fn degenerate(simulated: &Simulated) -> Option<Warning> {
@@ -335,9 +329,7 @@ fn lost(measurement: &Measurement) -> Option<Warning> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{GpuSpec, HeatQuantity, RunQuantity, SampledSummary};
-    use timing::streams::failures;
-    use timing::{FrameClock, Level, Recorder};
+    use crate::{HeatQuantity, RunQuantity, SampledSummary};
 
     #[test]
     fn starts_off_by_more_than_half_of_their_frame_are_warned_about() {
@@ -430,57 +422,5 @@ mod tests {
         assert_eq!(messages.len(), 2, "{messages:?}");
         assert!(messages[0].contains("samples_hit shows 1.0 %") && messages[0].contains("(frame 4)"));
         assert!(messages[1].contains("tile_madds shows 0.0 %") && messages[1].contains("(frame 3)"));
-    }
-
-    /// Warning codes of the failure streams at a level.
-    fn codes(level: Level) -> Vec<(String, Code)> {
-        let mut found = Vec::new();
-        for name in ["mobile", "reference", "discrete"] {
-            let mut gpu = GpuSpec::load(name).unwrap();
-            gpu.pipeline.batch_triangles = 512;
-            for case in failures(&gpu.units.clone(), 512) {
-                gpu.units = case.units;
-                let mut clock =
-                    FrameClock::new(level, gpu.machine().unwrap(), Recorder::new(1_000_000, 1 << 16));
-                case.packets.iter().for_each(|(packet, lines)| clock.push(packet, lines));
-                let timed = clock.finish().unwrap();
-                let warnings = AccuracyWarning::all(level, &timed).into_iter();
-                found.extend(warnings.map(|warning| (format!("{} on {name}", case.name), warning.code())));
-            }
-        }
-        found.sort();
-        found
-    }
-
-    #[test]
-    fn a_level_that_was_chosen_is_not_to_be_chosen_again() {
-        let message = |chosen| AccuracyWarning::MemoryRows(0.5).warning(3, Level::Packet, chosen).message;
-        let (requested, chosen) = (message(None), message(Some(0.012)));
-        assert!(requested.ends_with("use --timing stepped, or let --accuracy choose"), "{requested}");
-        let remedy = "`packet` was chosen with an error of 1.20 % on a probe; give a smaller --accuracy, or --timing stepped";
-        assert!(chosen.ends_with(remedy), "{chosen}");
-    }
-
-    #[test]
-    fn only_failure_streams_give_accuracy_warnings() {
-        let case = |name: &str, code| (name.to_owned(), code);
-        assert_eq!(codes(Level::Packet), [case("row after row on discrete", Code::MemoryRows)]);
-        assert_eq!(codes(Level::Stepped), []);
-        let (overlaps, bound): (Vec<_>, Vec<_>) =
-            codes(Level::Bound).into_iter().partition(|(_, code)| *code == Code::BatchOverlap);
-        assert!(!overlaps.is_empty());
-        let rows = [
-            "groups that scatter on discrete",
-            "groups that scatter on reference",
-            "groups that stream on reference",
-            "one giant triangle on mobile",
-            "one giant triangle on reference",
-            "row after row on discrete",
-            "row after row on mobile",
-            "row after row on reference",
-        ];
-        let rows = rows.map(|name| case(name, Code::MemoryRows));
-        let tiny = case("tiny triangles on discrete", Code::ShortPackets);
-        assert_eq!(bound, rows.into_iter().chain([tiny]).collect::<Vec<_>>());
     }
 }

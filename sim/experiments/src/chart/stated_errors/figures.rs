@@ -1,15 +1,12 @@
 //! What the errors of many runs say: accuracy of levels, stated errors, and designs whose order turns.
 
-use run::{CONFIDENCE, StatedError};
+use run::{CONFIDENCE, StatedError, error_size};
 use serde::Serialize;
-use timing::Level;
+use timing::{Checked, Level};
 
 use super::{ErrorRow, LEVELS, StatedErrorsChart};
 use crate::chart::quantiles;
 use crate::study::table::{Sheet, TableBuilder, optional, percent, plain, share};
-
-/// Error of cycles that `packet` promises to warn of, as a share.
-const FAR: f64 = 0.08;
 
 /// Errors of a level over all runs, in percent, and what its warnings say about them.
 #[derive(Clone, Debug, Serialize)]
@@ -41,19 +38,15 @@ pub struct Accuracy {
 /// The logarithm of an error of a run.
 type Log = fn(&ErrorRow) -> f64;
 
-/// Size of an error from the logarithm of a ratio: 0.05 for 1.05 and for 1/1.05.
-fn size(log: f64) -> f64 {
-    libm::expm1(log.abs())
-}
-
 impl Accuracy {
     /// Over the rows of a level.
     pub(super) fn of(level: Level, rows: &[ErrorRow]) -> Self {
         let rows: Vec<&ErrorRow> = rows.iter().filter(|row| row.level == level).collect();
-        let of = |log: Log| quantiles(rows.iter().map(move |row| 100.0 * size(log(row))));
+        let of = |log: Log| quantiles(rows.iter().map(move |row| 100.0 * error_size(log(row))));
         let (cycles, energy) = (of(|row| row.cycles_log), of(|row| row.energy_log));
         let count = |far: bool, warned: bool| {
-            let is = |row: &&&ErrorRow| (size(row.cycles_log) > FAR, row.is_warned()) == (far, warned);
+            let is =
+                |row: &&&ErrorRow| (error_size(row.cycles_log) > Checked::FAR, row.warns) == (far, warned);
             rows.iter().filter(is).count()
         };
         Self {
@@ -72,18 +65,17 @@ impl Accuracy {
     }
 }
 
-/// Runs at a level, with or without a warning. Errors are factors less one.
+/// What is added to the error that the check of a run finds, so that the sum holds for 95 % of runs at a level.
+/// Errors are factors less one.
 #[derive(Clone, Debug, Serialize)]
-pub struct ErrorGroup {
+pub struct StatedMargin {
     /// The level.
     pub level: Level,
-    /// Whether it warns.
-    pub warns: bool,
     /// Frames on GPUs.
     pub runs: usize,
-    /// The error of cycles to state from these runs; infinite with too few of them.
+    /// The margin of cycles from these runs; infinite with too few of them.
     pub cycles: f64,
-    /// Error of energy.
+    /// Margin of energy.
     pub energy: f64,
     /// Share of runs whose cycles are within the error that the program states; `None` without runs.
     pub held_cycles: Option<f64>,
@@ -93,6 +85,31 @@ pub struct ErrorGroup {
     pub held_out_cycles: Option<f64>,
     /// The same of energy.
     pub held_out_energy: Option<f64>,
+}
+
+/// By how much an error is larger than what the check of its run found.
+fn beyond_check(row: &ErrorRow, log: Log) -> f64 {
+    (error_size(log(row)) - error_size(row.checked_log)).max(0.0)
+}
+
+impl StatedMargin {
+    /// Over the rows of a level.
+    pub(super) fn of(level: Level, rows: &[ErrorRow]) -> Self {
+        let rows: Vec<&ErrorRow> = rows.iter().filter(|row| row.level == level).collect();
+        let all = |log: Log| rows.iter().map(move |row| beyond_check(row, log));
+        let (cycles, energy): (Log, Log) = (|row| row.cycles_log, |row| row.energy_log);
+        let stated = StatedError::of(level, 0.0);
+        Self {
+            level,
+            runs: rows.len(),
+            cycles: bound(all(cycles)),
+            energy: bound(all(energy)),
+            held_cycles: held(all(cycles), stated.cycles),
+            held_energy: held(all(energy), stated.energy),
+            held_out_cycles: held_out(&rows, cycles),
+            held_out_energy: held_out(&rows, energy),
+        }
+    }
 }
 
 /// The bound that a further error stays within with a probability of 95 %, if it is like these: the conformal
@@ -105,10 +122,10 @@ fn bound(errors: impl Iterator<Item = f64>) -> f64 {
 }
 
 /// Share of the errors within a bound.
-fn held(errors: impl Iterator<Item = f64>, bound: impl Fn() -> f64) -> Option<f64> {
+fn held(errors: impl Iterator<Item = f64>, bound: f64) -> Option<f64> {
     let (mut within, mut all) = (0_u32, 0_u32);
     for error in errors {
-        (within, all) = (within + u32::from(error <= bound()), all + 1);
+        (within, all) = (within + u32::from(error <= bound), all + 1);
     }
     (all > 0).then(|| f64::from(within) / f64::from(all))
 }
@@ -117,38 +134,15 @@ fn held(errors: impl Iterator<Item = f64>, bound: impl Fn() -> f64) -> Option<f6
 fn held_out(rows: &[&ErrorRow], log: Log) -> Option<f64> {
     let part = |half: usize| {
         let is = move |row: &&&ErrorRow| row.subject_number % 2 == half && row.gpu % 2 == half as u64;
-        rows.iter().filter(is).map(move |row| size(log(row)))
+        rows.iter().filter(is).map(move |row| beyond_check(row, log))
     };
     let bounds = [0, 1].map(|half| bound(part(half)));
     if bounds.iter().any(|bound| bound.is_infinite()) {
         return None;
     }
-    let shares = [0, 1].map(|half| held(part(half), || bounds[1 - half]));
+    let shares = [0, 1].map(|half| held(part(half), bounds[1 - half]));
     let counts = [0, 1].map(|half| part(half).count() as f64);
     Some((shares[0]? * counts[0] + shares[1]? * counts[1]) / (counts[0] + counts[1]))
-}
-
-/// All groups.
-pub(super) fn groups(rows: &[ErrorRow]) -> Vec<ErrorGroup> {
-    let of = |(level, warns): (Level, bool)| {
-        let rows: Vec<&ErrorRow> =
-            rows.iter().filter(|row| (row.level, row.is_warned()) == (level, warns)).collect();
-        let sizes = |log: Log| rows.iter().map(move |row| size(log(row)));
-        let (cycles, energy): (Log, Log) = (|row| row.cycles_log, |row| row.energy_log);
-        let stated = StatedError::at(level, warns);
-        ErrorGroup {
-            level,
-            warns,
-            runs: rows.len(),
-            cycles: bound(sizes(cycles)),
-            energy: bound(sizes(energy)),
-            held_cycles: held(sizes(cycles), || stated.cycles),
-            held_energy: held(sizes(energy), || stated.energy),
-            held_out_cycles: held_out(&rows, cycles),
-            held_out_energy: held_out(&rows, energy),
-        }
-    };
-    LEVELS.into_iter().flat_map(|level| [(level, false), (level, true)]).map(of).collect()
 }
 
 /// Pairs of GPUs on one frame whose order a level turns round.
@@ -177,7 +171,7 @@ fn flips_by(rows: &[ErrorRow], level: Level, by: &'static str) -> Flips {
     let of_level: Vec<&ErrorRow> = rows.iter().filter(|row| row.level == level).collect();
     // Logarithm of the truth, of what was found, and of the stated error.
     let logs = |row: &ErrorRow| {
-        let stated = StatedError::at(level, row.is_warned());
+        let stated = StatedError::of(level, libm::expm1(row.checked_log));
         let [truth, error, stated] = match by {
             "time" => [row.stepped_s, row.cycles_log, stated.cycles],
             _ => [row.stepped_j, row.energy_log, stated.energy],
@@ -218,13 +212,12 @@ impl StatedErrorsChart {
             .sheet()
     }
 
-    /// Stated errors. The file is the one that the program reads.
-    pub(super) fn group_sheet(&self) -> Sheet {
-        TableBuilder::of(&self.groups)
+    /// Margins of stated errors. The file is the one that the program reads.
+    pub(super) fn margin_sheet(&self) -> Sheet {
+        TableBuilder::of(&self.margins)
             .column("level", "level", |row| row.level.name(), plain)
-            .column("warns", "warns", |row| row.warns.to_string(), plain)
             .column("runs", "runs", |row| row.runs, plain)
-            .column("cycles", "to state: cycles", |row| row.cycles, share(1))
+            .column("cycles", "to add: cycles", |row| row.cycles, share(1))
             .column("energy", "energy", |row| row.energy, share(1))
             .shown("stated holds: cycles", |row| row.held_cycles, optional(share(1)))
             .shown("energy", |row| row.held_energy, optional(share(1)))
@@ -251,7 +244,7 @@ impl StatedErrorsChart {
             .data("subject", |row| row.subject.as_str())
             .data("gpu", |row| row.gpu)
             .data("level", |row| row.level.name())
-            .data("warns", |row| row.warns.as_str())
+            .data("checked_log", |row| row.checked_log)
             .data("cycles_log", |row| row.cycles_log)
             .data("energy_log", |row| row.energy_log)
             .data("stepped_s", |row| row.stepped_s)
@@ -274,8 +267,8 @@ mod tests {
         assert_eq!(bound((1..=18).map(f64::from)), f64::INFINITY);
         assert_eq!(bound((1..=19).map(f64::from)), 19.0);
         assert_eq!(bound((1..=99).map(f64::from)), 95.0);
-        assert_eq!(held([1.0, 2.0, 3.0, 4.0].into_iter(), || 3.0), Some(0.75));
-        assert_eq!(held(std::iter::empty(), || 3.0), None);
+        assert_eq!(held([1.0, 2.0, 3.0, 4.0].into_iter(), 3.0), Some(0.75));
+        assert_eq!(held(std::iter::empty(), 3.0), None);
     }
 
     fn row(gpu: u64, stepped_s: f64, cycles_log: f64) -> ErrorRow {
@@ -284,7 +277,8 @@ mod tests {
             subject_number: 0,
             gpu,
             level: Level::Packet,
-            warns: String::new(),
+            checked_log: cycles_log,
+            warns: false,
             cycles_log,
             energy_log: 0.0,
             stepped_s,
@@ -308,7 +302,7 @@ mod tests {
     #[test]
     fn accuracy_counts_what_is_far_and_warned() {
         let mut rows = vec![row(0, 1.0, 0.01), row(1, 1.0, 0.2), row(2, 1.0, -0.2), row(3, 1.0, 0.0)];
-        rows[1].warns = "memory-rows".to_owned();
+        rows[1].warns = true;
         let found = Accuracy::of(Level::Packet, &rows);
         let counts = [found.far_warned, found.far_silent, found.near_warned, found.near_silent];
         assert_eq!(counts, [1, 1, 0, 2]);

@@ -9,23 +9,23 @@
 
 mod figures;
 
-use activity::Bounded;
+use activity::{Bounded, PacketBuffer};
 use output::OutputError;
 use output::plot::{AxisSpec, ChartPanel, Paint, PlotMark, Scale, Series};
 use output::terminal::Progress;
 use rayon::prelude::*;
 use run::{GpuSpec, RunError, StatedError};
 use serde::Serialize;
-use timing::{AccuracyWarning, Level, Rates, Timed};
+use timing::{Checked, Level, Rates, Timed};
 use traces::stats::Random;
 
 use super::timing::animations;
-use super::timing::animations::{Packets, Subject};
-use super::timing::measure::{Written, power_model, timed};
+use super::timing::animations::Subject;
+use super::timing::measure::{Written, checked, power_model, timed};
 use crate::study::table::Sheet;
 use crate::study::{Gallery, Study, StudyError};
 
-pub use figures::{Accuracy, ErrorGroup, Flips};
+pub use figures::{Accuracy, Flips, StatedMargin};
 
 /// Levels that have errors.
 const LEVELS: [Level; 2] = [Level::Packet, Level::Bound];
@@ -58,8 +58,10 @@ pub struct ErrorRow {
     pub gpu: u64,
     /// The level.
     pub level: Level,
-    /// Codes of its accuracy warnings.
-    pub warns: String,
+    /// Error that the check of the level found, and whether it is worth a warning.
+    pub checked_log: f64,
+    /// See above.
+    pub warns: bool,
     /// Error of cycles.
     pub cycles_log: f64,
     /// Error of the energy of the frame.
@@ -78,12 +80,6 @@ pub struct ErrorRow {
     pub packets_per_cycle: f64,
 }
 
-impl ErrorRow {
-    fn is_warned(&self) -> bool {
-        !self.warns.is_empty()
-    }
-}
-
 /// The whole chart.
 #[derive(Clone, Debug, Serialize)]
 pub struct StatedErrorsChart {
@@ -92,7 +88,7 @@ pub struct StatedErrorsChart {
     /// Errors of levels, and what their warnings say.
     pub levels: Vec<Accuracy>,
     /// Stated errors, and how often they hold.
-    pub groups: Vec<ErrorGroup>,
+    pub margins: Vec<StatedMargin>,
     /// Pairs of GPUs whose order a level turns round.
     pub flips: Vec<Flips>,
     /// A row for each frame, GPU and level.
@@ -139,29 +135,28 @@ impl Study for StatedErrorsChart {
             rows.extend(found.into_iter().flatten());
         }
         let levels = LEVELS.map(|level| Accuracy::of(level, &rows)).into();
-        Ok(Self { effort, levels, groups: figures::groups(&rows), flips: figures::flips(&rows), rows })
+        let margins = LEVELS.map(|level| StatedMargin::of(level, &rows)).into();
+        Ok(Self { effort, levels, margins, flips: figures::flips(&rows), rows })
     }
 
     fn draw(&self, to: &Gallery<'_>) -> Result<(), OutputError> {
         let subject = format!(
-            "single frames on {} GPUs drawn at random; rings: the level warned; line: stated without a warning",
+            "single frames on {} GPUs drawn at random; rings: the level warned; line: stated if its check finds no error",
             self.effort.gpus
         );
         to.chart("stated_errors", ["Errors of timing levels on random GPUs", &subject], self.panels())
     }
 
     fn tables(&self) -> Vec<Sheet> {
-        vec![self.level_sheet(), self.group_sheet(), self.flip_sheet(), self.row_sheet()]
+        vec![self.level_sheet(), self.margin_sheet(), self.flip_sheet(), self.row_sheet()]
     }
 
     /// Stated errors hold as often as they say, on frames and GPUs that they were not made from.
     fn fault(&self) -> Option<String> {
-        let broken = |group: &&ErrorGroup| group.held_out_cycles.is_some_and(|share| share < MIN_HELD);
-        let group = self.groups.iter().filter(|_| self.effort.gpus >= MIN_GPUS).find(broken)?;
-        let held = 100.0 * group.held_out_cycles?;
-        let warned = if group.warns { "with" } else { "without" };
-        let level = group.level.name();
-        Some(format!("errors of `{level}` {warned} a warning, stated for 95 % of runs, hold for {held:.1} %"))
+        let broken = |of: &&StatedMargin| of.held_out_cycles.is_some_and(|share| share < MIN_HELD);
+        let margin = self.margins.iter().filter(|_| self.effort.gpus >= MIN_GPUS).find(broken)?;
+        let (level, held) = (margin.level.name(), 100.0 * margin.held_out_cycles?);
+        Some(format!("errors of `{level}`, stated for 95 % of runs, hold for {held:.1} %"))
     }
 }
 
@@ -169,7 +164,7 @@ impl Study for StatedErrorsChart {
 fn errors(
     (subject_number, subject): (usize, &Subject),
     (gpu_number, gpu): (u64, &RandomGpu),
-    stream: &Packets,
+    stream: &PacketBuffer,
 ) -> Result<Vec<ErrorRow>, RunError> {
     let spec = &gpu.spec;
     let model = power_model(spec)?;
@@ -186,13 +181,14 @@ fn errors(
     let (truth, stepped_j) = cost(Level::Stepped)?;
     let row = |level: Level| {
         let (found, energy_j) = cost(level)?;
-        let warns = AccuracyWarning::all(level, &found).into_iter().map(|warning| warning.code().name());
+        let checked = checked(level, spec, stream)?;
         Ok(ErrorRow {
             subject: subject.name().to_owned(),
             subject_number,
             gpu: gpu_number,
             level,
-            warns: warns.collect::<Vec<_>>().join(" "),
+            checked_log: libm::log1p(checked.map_or(0.0, |checked| checked.error)),
+            warns: checked.is_some_and(Checked::is_far),
             cycles_log: libm::log(found.cycles as f64 / truth.cycles as f64),
             energy_log: libm::log(energy_j / stepped_j),
             stepped_s: truth.cycles as f64 / spec.core_hz,
@@ -200,7 +196,7 @@ fn errors(
             distance: gpu.distance,
             channels: spec.units.dram.channels.get(),
             row_bytes: spec.units.dram.row_bytes.get(),
-            packets_per_cycle: stream.packets.len() as f64 / truth.cycles as f64,
+            packets_per_cycle: stream.len() as f64 / truth.cycles as f64,
         })
     };
     LEVELS.into_iter().map(row).collect()
@@ -224,11 +220,11 @@ impl StatedErrorsChart {
     fn panel(&self, level: Level, (name, scale, of): Quantity) -> ChartPanel {
         let rows = || self.rows.iter().filter(|row| row.level == level);
         let points = |warned: bool| {
-            let rows = rows().filter(|row| row.is_warned() == warned);
+            let rows = rows().filter(|row| row.warns == warned);
             rows.map(|row| (of(row), 100.0 * row.cycles_log.abs(), String::new())).collect()
         };
         let ends = rows().map(of).fold([f64::INFINITY, 0.0], |[low, high], x| [low.min(x), high.max(x)]);
-        let stated = 100.0 * libm::log1p(StatedError::at(level, false).cycles);
+        let stated = 100.0 * libm::log1p(StatedError::of(level, 0.0).cycles);
         let line = ends.map(|x| (x, stated)).to_vec();
         let series = vec![
             Series::new("without a warning", PlotMark::Dots(points(false))).painted(Paint::Like(0)),
@@ -361,7 +357,7 @@ mod tests {
             );
         }
         let text = std::fs::read_to_string(folder.path().join("stated_errors.csv")).unwrap();
-        assert!(text.starts_with("level,warns,runs,cycles,energy"), "{text}");
+        assert!(text.starts_with("level,runs,cycles,energy"), "{text}");
         assert!(done.text.contains("packet") && done.fault.is_none());
     }
 

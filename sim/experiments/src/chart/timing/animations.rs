@@ -3,7 +3,7 @@
 
 use std::path::Path;
 
-use activity::{LineAccess, Packet};
+use activity::{LineAccess, Packet, PacketBuffer};
 use cpu_time::ProcessTime;
 use glam::Vec3;
 use output::terminal::Progress;
@@ -166,34 +166,6 @@ pub(super) const SCENES: [&str; 2] = ["default", "tiny"];
 const FAMILIES: [(&str, f64); 4] =
     [("lens-and-motion", 2.0), ("micro", 1.0), ("behind", 0.0), ("diagonals", 128.0)];
 
-/// The packets of a frame, each with the end of its lines.
-#[derive(Default)]
-pub(in crate::chart) struct Packets {
-    pub packets: Vec<(Packet, usize)>,
-    pub lines: Vec<LineAccess>,
-}
-
-impl Packets {
-    /// Packets that have their lines with them.
-    pub fn of(packets: &[(Packet, Vec<LineAccess>)]) -> Self {
-        let mut all = Self::default();
-        for (packet, lines) in packets {
-            all.lines.extend_from_slice(lines);
-            all.packets.push((*packet, all.lines.len()));
-        }
-        all
-    }
-
-    /// Each packet with its lines.
-    pub fn each(&self, mut to: impl FnMut(&Packet, &[LineAccess])) {
-        let mut first = 0;
-        for (packet, end) in &self.packets {
-            to(packet, &self.lines[first..*end]);
-            first = *end;
-        }
-    }
-}
-
 /// A frame that can be rendered for any GPU.
 pub(in crate::chart) struct Subject {
     name: String,
@@ -318,12 +290,9 @@ impl Subject {
     }
 
     /// Packets of the subject as the pipeline of `gpu` emits them.
-    pub fn stream(&self, gpu: &GpuSpec) -> Result<Packets, RunError> {
-        let mut stream = Packets::default();
-        self.render(gpu, |packet, lines| {
-            stream.lines.extend_from_slice(lines);
-            stream.packets.push((*packet, stream.lines.len()));
-        })?;
+    pub fn stream(&self, gpu: &GpuSpec) -> Result<PacketBuffer, RunError> {
+        let mut stream = PacketBuffer::default();
+        self.render(gpu, |packet, lines| stream.push(packet, lines))?;
         Ok(stream)
     }
 

@@ -3,19 +3,19 @@
 
 use std::collections::BTreeMap;
 
-use activity::{Event, Timeline, Unit};
+use activity::{Event, PacketBuffer, Timeline, Unit};
 use cpu_time::{ProcessTime, ThreadTime};
 use power_model::{Bound, EnergyTable, FramePower, Platform, PowerModel};
 use run::{GpuSpec, RunError, cheapest_level};
 use serde::Serialize;
 use timing::stepped::{self, StepOptions, Stream};
 use timing::{
-    AccuracyWarning, Clocks, DemandBuilder, FrameClock, Level, PacketClock, Recorder, Timed, TimingError,
-    Totals, bound, streams,
+    Checked, Clocks, DemandBuilder, FrameClock, Level, PacketClock, Recorder, Timed, TimingError, Totals,
+    bound, streams,
 };
 
 use super::Reference;
-use super::animations::{Packets, Subject, SubjectKind};
+use super::animations::{Subject, SubjectKind};
 
 /// Bins of a microsecond, as in a run.
 const BIN_PS: u64 = 1_000_000;
@@ -54,8 +54,10 @@ pub struct TimingRow {
     pub power_shape_error_1us_percent: f64,
     /// The unit that the reference finds busiest over the frame, and its share.
     pub busiest: (&'static str, f64),
-    /// Codes of the warnings that a run at this level would give of its time.
-    pub warns: Vec<&'static str>,
+    /// What the check of the level finds.
+    pub checked_percent: f64,
+    /// Whether a run at this level would warn of it.
+    pub warns: bool,
     /// Seconds of the host's processor, timing alone: the stream is written.
     pub cpu_s: f64,
     /// Seconds of the host's processor to turn packets into service demands, once for all levels.
@@ -94,7 +96,7 @@ pub(in crate::chart) fn power_model(gpu: &GpuSpec) -> Result<PowerModel, RunErro
 pub(super) fn rows(
     (scene, kind): (&str, Option<SubjectKind>),
     gpu: &GpuSpec,
-    stream: &Packets,
+    stream: &PacketBuffer,
     speed: &mut Speed,
 ) -> Result<Vec<TimingRow>, RunError> {
     let model = power_model(gpu)?;
@@ -113,13 +115,13 @@ pub(super) fn rows(
         for _ in 1..TIMES {
             cpu_s = cpu_s.min(timed(level, gpu, &written)?.1);
         }
-        let found_power = power(&found)?;
+        let (found_power, check) = (power(&found)?, checked(level, gpu, stream)?);
         rows.push(TimingRow {
             scene: scene.to_owned(),
             kind,
             gpu: gpu.name.clone(),
             level,
-            packets: stream.packets.len(),
+            packets: stream.len(),
             cycles: found.cycles,
             stepped_cycles: truth.cycles,
             cycle_error_percent: percent(found.cycles as f64, truth.cycles as f64),
@@ -129,10 +131,8 @@ pub(super) fn rows(
             power_shape_error_percent: shape_error(&found_power, &true_power, 20e-6),
             power_shape_error_1us_percent: shape_error(&found_power, &true_power, 1e-6),
             busiest: busiest(&truth.timeline),
-            warns: AccuracyWarning::all(level, &found)
-                .into_iter()
-                .map(|warning| warning.code().name())
-                .collect(),
+            checked_percent: 100.0 * check.map_or(0.0, |check| check.error),
+            warns: check.is_some_and(Checked::is_far),
             cpu_s,
             written_s: written.cpu_s,
             speedup_over_stepped: stepped_s / cpu_s,
@@ -151,15 +151,15 @@ pub(in crate::chart) struct Written {
 }
 
 impl Written {
-    pub fn new(gpu: &GpuSpec, packets: &Packets) -> Result<Self, RunError> {
+    pub fn new(gpu: &GpuSpec, packets: &PacketBuffer) -> Result<Self, RunError> {
         let clocks = gpu.clocks().ok_or_else(|| TimingError::Clocks(gpu.name.clone()))?;
         let started = ThreadTime::now();
         let mut builder = DemandBuilder::new(&gpu.units);
         let (mut stream, mut totals) = (Stream::default(), Totals::new(&gpu.units, &clocks));
-        packets.each(|packet, lines| {
+        for (packet, lines) in packets.iter() {
             stream.push(&mut builder, packet, lines);
             stream.add_last(&builder, &mut totals);
-        });
+        }
         Ok(Self { clocks, builder, stream, totals, cpu_s: started.elapsed().as_secs_f64() })
     }
 }
@@ -182,6 +182,17 @@ pub(in crate::chart) fn timed(
         Level::Bound => bound(&gpu.units, *clocks, totals, recorder),
     };
     Ok((timed, started.elapsed().as_secs_f64()))
+}
+
+/// The check of a level on a frame.
+pub(in crate::chart) fn checked(
+    level: Level,
+    gpu: &GpuSpec,
+    packets: &PacketBuffer,
+) -> Result<Option<Checked>, RunError> {
+    let mut clock = FrameClock::checked(level, gpu.machine()?, Recorder::new(BIN_PS, MAX_BINS));
+    clock.push_all(packets);
+    Ok(clock.finish()?.checked)
 }
 
 fn percent(found: f64, truth: f64) -> f64 {
@@ -254,7 +265,7 @@ pub(super) fn added(subject: &Subject, gpu: &GpuSpec) -> Result<Vec<AddedRow>, R
     let drawn_s = fastest(|| subject.render(gpu, |_, _| {}))?;
     let row = |level| {
         let timed_s = fastest(|| {
-            let mut clock = FrameClock::new(level, gpu.machine()?, Recorder::new(BIN_PS, MAX_BINS));
+            let mut clock = FrameClock::checked(level, gpu.machine()?, Recorder::new(BIN_PS, MAX_BINS));
             subject.render(gpu, |packet, lines| clock.push(packet, lines))?;
             clock.finish()?;
             Ok(())
@@ -315,8 +326,10 @@ pub struct FailedLevel {
     pub cycle_error_percent: f64,
     /// Relative error of the energy.
     pub energy_error_percent: f64,
-    /// Codes of the warnings that a run would give.
-    pub warns: Vec<&'static str>,
+    /// What the check of the level finds.
+    pub checked_percent: f64,
+    /// Whether a run would warn of it.
+    pub warns: bool,
 }
 
 /// A rate by a microbenchmark that requests nothing else, in units of 1e9 a second.
@@ -332,6 +345,10 @@ pub struct RateRow {
     pub card: &'static str,
 }
 
+fn buffered(packets: &streams::Packets) -> PacketBuffer {
+    packets.iter().map(|(packet, lines)| (packet, &lines[..])).collect()
+}
+
 /// Every stream on every GPU of `gpus`.
 pub(super) fn failures(gpus: &[GpuSpec]) -> Result<Vec<FailureRow>, RunError> {
     let cases: Vec<_> = gpus.iter().map(|gpu| streams::failures(&gpu.units, BATCH)).collect();
@@ -341,7 +358,7 @@ pub(super) fn failures(gpus: &[GpuSpec]) -> Result<Vec<FailureRow>, RunError> {
         {
             let mut gpu = GpuSpec { units: case.units.clone(), ..gpu.clone() };
             gpu.pipeline.batch_triangles = BATCH;
-            let packets = Packets::of(&case.packets);
+            let packets = buffered(&case.packets);
             failures
                 .push(failure(case.name, rows((case.name, None), &gpu, &packets, &mut Speed::default())?));
         }
@@ -358,7 +375,8 @@ fn failure(stream: &'static str, found: Vec<TimingRow>) -> FailureRow {
     let level = |row: &TimingRow| FailedLevel {
         cycle_error_percent: row.cycle_error_percent,
         energy_error_percent: row.energy_error_percent,
-        warns: row.warns.clone(),
+        checked_percent: row.checked_percent,
+        warns: row.warns,
     };
     FailureRow {
         stream,
@@ -380,7 +398,7 @@ pub(super) fn rates() -> Result<Vec<RateRow>, RunError> {
         _ => "264 listed",
     };
     let row = |rate: streams::Rate| {
-        let written = Written::new(&gpu, &Packets::of(&rate.packets))?;
+        let written = Written::new(&gpu, &buffered(&rate.packets))?;
         let mut giga_per_s = BTreeMap::new();
         for level in Level::ALL {
             let (timed, _) = timed(level, &gpu, &written)?;

@@ -179,9 +179,7 @@ impl Study for TimingChart {
     fn fault(&self) -> Option<String> {
         let median = self.levels.get(Level::Packet.name())?.cycle_error_median_percent;
         let silent = |row: &&TimingRow| {
-            row.level == Level::Packet
-                && row.warns.is_empty()
-                && row.cycle_error_percent.abs() > MAX_WORST_PERCENT
+            row.level == Level::Packet && !row.warns && row.cycle_error_percent.abs() > MAX_WORST_PERCENT
         };
         if let Some(row) = self.rows.iter().find(silent) {
             let (scene, gpu, error) = (&row.scene, &row.gpu, row.cycle_error_percent);
@@ -288,7 +286,7 @@ impl TimingChart {
         let of = |scene: &str, level: Level| {
             let rows = self.rows.iter().filter(move |row| row.scene == scene && row.level == level);
             let each = rows.map(|row| {
-                let warns = if row.warns.is_empty() { "" } else { " (warns)" };
+                let warns = if row.warns { " (warns)" } else { "" };
                 format!("{:+.1}{warns}", row.cycle_error_percent)
             });
             each.collect::<Vec<_>>().join(", ")
@@ -318,7 +316,8 @@ impl TimingChart {
             .data("scene", |row| row.scene.as_str())
             .data("gpu", |row| row.gpu.as_str())
             .data("level", |row| row.level.name())
-            .data("warns", |row| row.warns.join(" "))
+            .data("warns", |row| row.warns.to_string())
+            .data("checked_percent", |row| row.checked_percent)
             .data("packets", |row| row.packets)
             .data("cycles", |row| row.cycles)
             .data("stepped_cycles", |row| row.stepped_cycles)
@@ -375,7 +374,8 @@ impl TimingChart {
             .data("level", |(_, (level, _))| **level)
             .data("cycle_error_percent", |(_, (_, found))| found.cycle_error_percent)
             .data("energy_error_percent", |(_, (_, found))| found.energy_error_percent)
-            .data("warns", |(_, (_, found))| found.warns.join(" "))
+            .data("checked_percent", |(_, (_, found))| found.checked_percent)
+            .data("warns", |(_, (_, found))| found.warns.to_string())
             .csv("timing_failures.csv")
             .sheet()
     }
@@ -388,10 +388,8 @@ impl TimingChart {
             }
         };
         let warns = |row: &&FailureRow| {
-            let levels = row.levels.iter();
-            let each = levels
-                .flat_map(|(level, found)| found.warns.iter().map(move |code| format!("{code} at {level}")));
-            each.collect::<Vec<_>>().join(", ")
+            let levels = row.levels.iter().filter(|(_, found)| found.warns).map(|(level, _)| *level);
+            levels.collect::<Vec<_>>().join(", ")
         };
         let mut table = TableBuilder::of(&self.failures)
             .detail("stream", |row| row.stream, plain)
