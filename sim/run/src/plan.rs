@@ -18,6 +18,9 @@ use crate::hardware;
 use crate::options::{Change, DEFAULT_RATE_HZ, PacingChoice, Requested, RunOptions};
 
 /// Plan of a run: options, and all inputs loaded and checked.
+///
+/// GPU, platform, energy table and power model follow from each other: callers read them, and change them by
+/// [`RunOptions::changes`] or [`Self::on`].
 pub struct Plan {
     /// The options.
     pub options: RunOptions,
@@ -28,17 +31,17 @@ pub struct Plan {
     /// Size of the image.
     pub viewport: Viewport,
     /// The hardware.
-    pub gpu: GpuSpec,
+    pub(crate) gpu: GpuSpec,
     /// The platform, with its watts scaled to the GPU, at the bound of the options.
-    pub platform: Platform,
+    pub(crate) platform: Platform,
     /// The platform as in its file.
     unscaled: Platform,
     /// Energy table, in joules per event, as in its file.
-    pub table: EnergyTable,
+    pub(crate) table: EnergyTable,
     /// What the GPU costs over the one that the platform was made for.
-    pub scaling: Scaling,
+    pub(crate) scaling: Scaling,
     /// Power model of table and platform, scaled to the GPU.
-    pub model: PowerModel,
+    pub(crate) model: PowerModel,
     /// Warning of a platform or table that does not belong to the GPU.
     pub(crate) pairing: Option<Warning>,
     /// Relative error on the probe of the timing level, if `--accuracy` or `--budget` chose it.
@@ -142,6 +145,26 @@ impl Plan {
         let plan = Self { gpu, platform, unscaled, table, scaling, model, pairing, ..self };
         plan.size().check()?;
         Ok(plan)
+    }
+
+    /// The hardware.
+    pub const fn gpu(&self) -> &GpuSpec {
+        &self.gpu
+    }
+
+    /// The platform, with its watts scaled to the GPU, at the bound of the options.
+    pub const fn platform(&self) -> &Platform {
+        &self.platform
+    }
+
+    /// Energy table, in joules per event, as in its file.
+    pub const fn table(&self) -> &EnergyTable {
+        &self.table
+    }
+
+    /// Power model of table and platform, scaled to the GPU.
+    pub const fn model(&self) -> &PowerModel {
+        &self.model
     }
 
     /// The power model with all energies and watts at `bound`.

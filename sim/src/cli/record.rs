@@ -185,7 +185,7 @@ fn timed(args: &TimeArgs, recorded: &RecordedRun, gpus: &[PathBuf]) -> Result<Ve
     let plans: Vec<Plan> = gpus.iter().map(|gpu| planned(args, recorded, gpu)).collect::<Result<_, _>>()?;
     let timed = recorded.timed(&plans.iter().collect::<Vec<_>>())?;
     let row = |((gpu, plan), timed): ((&PathBuf, &Plan), TimedFrames<'_>)| {
-        let frames = timed.powered(&plan.model)?;
+        let frames = timed.powered(plan.model())?;
         Ok(TimedRow { gpu: gpu.display().to_string(), measured: measured(plan, frames, recorded.groups())? })
     };
     gpus.iter().zip(&plans).zip(timed).map(row).collect()

@@ -173,7 +173,7 @@ pub fn measured(plan: &Plan, distinct: Vec<RunFrame>, groups: &[usize]) -> Resul
     let simulated = Simulated { distinct, frames, pictures, heat, sampled: None };
     let frames: &[&RunFrame] = &simulated.in_order().collect::<Vec<_>>();
     let powers: Vec<&FramePower> = frames.iter().map(|frame| &frame.power).collect();
-    let paced = pace(&powers, &plan.platform, plan.pacing)?;
+    let paced = pace(&powers, plan.platform(), plan.pacing)?;
     let count = frames.len() as f64;
     let cycles: u64 = frames.iter().map(|frame| frame.cycles).sum();
     let frame_j = paced.energy().total_j() / count;
@@ -211,9 +211,9 @@ fn used(plan: &Plan) -> BTreeMap<String, String> {
     let (options, settings) = (&plan.options, plan.job.settings());
     let texts = [
         ("scene", plan.name.clone()),
-        ("gpu", plan.gpu.name.clone()),
-        ("platform", plan.platform.name.clone()),
-        ("energy", plan.table.name().to_owned()),
+        ("gpu", plan.gpu().name.clone()),
+        ("platform", plan.platform().name.clone()),
+        ("energy", plan.table().name().to_owned()),
         ("bound", format!("{:?}", options.bound).to_lowercase()),
         ("timing", options.level().name().to_owned()),
         ("pacing", options.pacing.name().to_owned()),

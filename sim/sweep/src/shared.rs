@@ -153,7 +153,7 @@ impl Drawing {
     }
 
     fn measured(&self, run: &run::Plan, timed: &TimedFrames<'_>) -> Result<Measured, RunError> {
-        measured(run, timed.powered(&run.model)?, self.distinct.groups())
+        measured(run, timed.powered(run.model())?, self.distinct.groups())
     }
 }
 
@@ -180,7 +180,7 @@ impl Costs {
             let drawing_s = lap_s();
             let timed = recording.as_ref().map(|recording| recording.timed(&[&run])).transpose()?;
             let timing_s = lap_s();
-            timed.into_iter().flatten().try_for_each(|timed| timed.powered(&run.model).map(drop))?;
+            timed.into_iter().flatten().try_for_each(|timed| timed.powered(run.model()).map(drop))?;
             Ok(Self { points: 1, drawing_s, timing_s, power_s: resolved_s + lap_s() })
         });
         stages.unwrap_or_default()

@@ -4,10 +4,9 @@ use activity::{Event, Unit};
 use output::OutputError;
 use output::plot::{AxisSpec, ChartPanel, Paint, PlotMark, Scale, Series};
 use output::terminal::Progress;
-use pipeline::CacheSpec;
 use power_model::Part;
 use rayon::prelude::*;
-use run::{GpuSpec, Plan, RunError, RunFrame, RunOptions, frames_of};
+use run::{Change, GpuSpec, Plan, RunError, RunFrame, RunOptions, frames_of};
 use serde::Serialize;
 use workloads::Overrides;
 
@@ -142,32 +141,41 @@ fn measure(
         ..Overrides::default()
     };
     let [gpu, platform] = MACHINE.map(Into::into);
-    let options =
-        RunOptions { scene: work.into(), gpu, platform: Some(platform), overrides, ..RunOptions::default() };
-    let mut plan = Plan::resolve(options)?;
-    resize(&mut plan.gpu, level, size_mb);
+    let plan = Plan::resolve(RunOptions {
+        scene: work.into(),
+        gpu,
+        platform: Some(platform),
+        overrides,
+        changes: changes(level, size_mb)?,
+        ..RunOptions::default()
+    })?;
     let frames = frames_of(&plan, &[0], &Progress::new(true))?;
-    Ok(row(work, level, size_mb, &frames[0], plan.gpu.core_hz))
+    Ok(row(work, level, size_mb, &frames[0], plan.gpu().core_hz))
 }
 
-/// Change the size of `level`, with its ways; without a size it is left out, and so is a level below the LLC.
-fn resize(gpu: &mut GpuSpec, level: Unit, size_mb: f64) {
-    let (memory, units) = (&mut gpu.pipeline.memory, &mut gpu.units);
-    let of = |spec: CacheSpec| {
-        let entries = (size_mb * BYTES_PER_MB / f64::from(timing::LINE_BYTES)) as u32;
-        CacheSpec { entries: entries - entries % spec.ways, ..spec }
+/// Changes of the GPU file that give `level` a size, in whole sets of its ways; without a size it is left out,
+/// and so is a level below the LLC.
+fn changes(level: Unit, size_mb: f64) -> Result<Vec<Change>, RunError> {
+    let change = |path: String, value: String| Change { path: format!("gpu.{path}"), value };
+    let without = |level: Unit| {
+        let name = level.name();
+        [format!("pipeline.memory.{name}"), format!("units.{name}")]
+            .map(|path| change(path, "None".to_owned()))
     };
-    if level == Unit::Llc {
-        (memory.edram, units.edram) = (None, None);
-    }
-    let (size, rate) = match level {
-        Unit::Llc => (&mut memory.llc, &mut units.llc),
-        _ => (&mut memory.edram, &mut units.edram),
+    let memory = GpuSpec::load(MACHINE[0])?.pipeline.memory;
+    let (cache, mut changes) = match level {
+        Unit::Llc => (memory.llc, without(Unit::Edram).to_vec()),
+        _ => (memory.edram, Vec::new()),
     };
-    *size = size.filter(|_| size_mb > 0.0).map(of);
-    if size.is_none() {
-        *rate = None;
+    match cache.filter(|_| size_mb > 0.0) {
+        Some(cache) => {
+            let entries = (size_mb * BYTES_PER_MB / f64::from(timing::LINE_BYTES)) as u32;
+            let entries = entries - entries % cache.ways;
+            changes.push(change(format!("pipeline.memory.{}.entries", level.name()), entries.to_string()));
+        }
+        None => changes.extend(without(level)),
     }
+    Ok(changes)
 }
 
 fn row(work: &'static str, level: Unit, size_mb: f64, frame: &RunFrame, core_hz: f64) -> MemoryRow {
@@ -231,7 +239,7 @@ mod tests {
     use crate::study::written;
 
     #[test]
-    fn a_larger_level_hits_more_often_and_moves_no_more_bytes() {
+    fn a_larger_level_hits_more_often_and_costs_energy_where_it_moves_as_many_bytes() {
         let (folder, chart, _) = written::<MemoryChart>(MemoryEffort { size: (160, 90), samples: 4 });
         let csv = std::fs::read_to_string(folder.path().join("memory.csv")).unwrap();
         assert_eq!(csv.lines().count(), 1 + chart.rows.len());
@@ -241,6 +249,13 @@ mod tests {
             };
             assert!(rows.windows(2).all(grows), "{rows:?}");
             assert!(rows[0].hit_share.is_none() && rows[1].hit_share.is_some(), "{rows:?}");
+            // Energy per access and leakage follow the size.
+            let traffic = |row: &MemoryRow| (row.dram_bytes, row.hit_share);
+            let mut equal = rows.windows(2).filter(|pair| traffic(&pair[0]) == traffic(&pair[1])).peekable();
+            assert!(equal.peek().is_some(), "{rows:?}");
+            let costs =
+                |pair: &[MemoryRow]| pair[1].memory_j > pair[0].memory_j && pair[1].frame_j > pair[0].frame_j;
+            assert!(equal.all(costs), "{rows:?}");
         }
         // A frame of the default scene this small fits in the L2; the shadow maps do not.
         assert!(chart.rows.iter().any(|row| row.hit_share > Some(0.0)));

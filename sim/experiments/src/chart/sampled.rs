@@ -257,9 +257,9 @@ fn animation(
     let started = ProcessTime::now();
     let frames = frames_of(&plan, &numbers, progress)?;
     let all_s = started.elapsed().as_secs_f64();
-    let signatures = Signatures::new(&previews.frames, previews.pilot, &frames[previews.pilot], &plan.model);
+    let signatures = Signatures::new(&previews.frames, previews.pilot, &frames[previews.pilot], plan.model());
     let name = Path::new(scene).file_name().map_or(scene.into(), |file| file.to_string_lossy());
-    let truth = truth(&frames, plan.gpu.core_hz);
+    let truth = truth(&frames, plan.gpu().core_hz);
     let (mut trials, mut simulated) = (Vec::new(), 0);
     for seed in 1..=effort.seeds {
         let design = previews.design(&signatures, Sampling::Some.first(numbers.len()), seed);
@@ -268,7 +268,7 @@ fn animation(
         let found = [
             forecast.cycles_per_frame(),
             forecast.energy_per_frame_j(),
-            forecast.busy_power_w(plan.gpu.core_hz),
+            forecast.busy_power_w(plan.gpu().core_hz),
         ];
         let rows = QUANTITIES.into_iter().zip(truth).zip(found);
         trials.extend(rows.map(|((quantity, truth), found)| Trial {

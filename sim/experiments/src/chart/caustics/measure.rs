@@ -135,7 +135,7 @@ fn frame(effort: &CausticsEffort, slope: f64, place: usize) -> Result<MethodFram
         tests: counts[Event::SamplesTested],
         executions: counts[Event::SamplesHit],
         shader_ops: counts[Event::ShaderOps],
-        frame_s: cost.cycles / plan.gpu.core_hz,
+        frame_s: cost.cycles / plan.gpu().core_hz,
         frame_j: cost.energy_j,
     })
 }

@@ -255,12 +255,12 @@ fn cost(plan: &Plan, observed: &Observed) -> [f64; 3] {
         let is_of_groups = counts[Event::Groups] > 0 && pass.name != DISPLAY;
         if is_of_groups || pass.name.starts_with(&format!("{CHAIN} level ")) {
             busy_ps += time.end_ps - before_ps;
-            all[1] += plan.model.counts_energy(&counts).total_j();
+            all[1] += plan.model().counts_energy(&counts).total_j();
             all[2] += (counts[Event::BankConflicts] + counts[Event::AtomicConflicts]) as f64;
         }
         before_ps = time.end_ps;
     }
-    all[0] = cycles(busy_ps, plan.gpu.core_hz);
+    all[0] = cycles(busy_ps, plan.gpu().core_hz);
     all
 }
 

@@ -93,7 +93,7 @@ fn frame(kind: &'static str, dimensions: u32, more: (&str, String)) -> Result<Dr
         points,
         triangles: frames[0].triangles,
         shader_ops: counts[Event::ShaderOps],
-        frame_s: cost.cycles / plan.gpu.core_hz,
+        frame_s: cost.cycles / plan.gpu().core_hz,
         frame_j: cost.energy_j,
         cpu_s: 0.0,
         error: 0.0,

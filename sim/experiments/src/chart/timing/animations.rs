@@ -147,7 +147,7 @@ fn sampled(
     let previews = Previews::new(&all.plan, numbers, progress)?;
     let previews_s = started.elapsed().as_secs_f64();
     let signatures =
-        Signatures::new(&previews.frames, previews.pilot, &all.frames[previews.pilot], &all.plan.model);
+        Signatures::new(&previews.frames, previews.pilot, &all.frames[previews.pilot], all.plan.model());
     let count = numbers.len();
     let choice = |seed| {
         let design = previews.design(&signatures, Sampling::Some.first(count), seed);
