@@ -3,6 +3,8 @@
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
+#[cfg(unix)]
+use std::sync::{Arc, Once, atomic::AtomicBool};
 use std::time::Duration;
 
 use tempfile::TempDir;
@@ -100,6 +102,8 @@ impl Quintile {
     }
 
     fn start(&self, command: &mut Command) -> Running {
+        #[cfg(unix)]
+        handle_signals();
         let child = command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn();
         Running {
             child: child.unwrap_or_else(|error| panic!("starting {}: {error}", self.program.display())),
@@ -132,4 +136,20 @@ impl Quintile {
         assert_eq!(ended.code, Some(0), "quintile run {scene} {args:?}: {}", ended.stderr);
         ended
     }
+}
+
+/// Handles interrupt and termination as they are by default, so that calls do not inherit that they are ignored: scripts
+/// start background jobs, such as these tests, with interrupts ignored. A signal with a handler is not ignored, and a new
+/// program starts with its default.
+#[cfg(unix)]
+fn handle_signals() {
+    use signal_hook::consts::{SIGINT, SIGTERM};
+
+    static ONCE: Once = Once::new();
+    ONCE.call_once(|| {
+        for signal in [SIGINT, SIGTERM] {
+            let always = Arc::new(AtomicBool::new(true));
+            signal_hook::flag::register_conditional_default(signal, always).expect("a signal can be handled");
+        }
+    });
 }
