@@ -24,9 +24,10 @@ struct Resident {
 
 impl Resident {
     fn new(demand: &ServiceDemand, warps: u32) -> Self {
-        let steps = demand.steps();
+        // A warp without operations is on a core as long as one with one.
+        let steps = demand.steps().max(1);
         let operations = f64::from(demand.threads) * f64::from(demand.ops);
-        let lanes = operations / f64::from(steps.max(1)) / f64::from(warps.max(1));
+        let lanes = operations / f64::from(steps) / f64::from(warps.max(1));
         Self { warps, is_group: demand.group.is_some(), steps, lanes, remaining: warps, done: 0.0 }
     }
 }
@@ -136,13 +137,7 @@ impl Residents {
         for (&place, warp) in places.iter().zip(0..) {
             let begin = if is_group { ready.to } else { ready.spread(warp, count) } as f64;
             while self.end_next(begin) {}
-            if lanes > 0.0 {
-                self.cores.start(place, begin, &Warps { packet: Some(packet), count: each, steps, lanes });
-            } else {
-                let end = begin + self.cores.latency();
-                self.cores.release(place, end, each);
-                self.ended(packet, each, end);
-            }
+            self.cores.start(place, begin, &Warps { packet: Some(packet), count: each, steps, lanes });
         }
         self.sending = places;
         self.sending.clear();

@@ -2,8 +2,9 @@
 //! a step in no less than its latency.
 
 use std::cmp::Reverse;
-use std::collections::{BinaryHeap, VecDeque};
+use std::collections::BinaryHeap;
 
+use super::slots::FreeSlots;
 use crate::clock::Time;
 use crate::spec::ShaderSpec;
 
@@ -82,7 +83,7 @@ struct Core {
     lanes: u64,
     active: BinaryHeap<Reverse<Active>>,
     /// Slots that become free later, by time.
-    later: VecDeque<(f64, u32)>,
+    later: FreeSlots<f64>,
 }
 
 impl SharedCores {
@@ -94,7 +95,7 @@ impl SharedCores {
             step: 0.0,
             lanes: 0,
             active: BinaryHeap::new(),
-            later: VecDeque::new(),
+            later: FreeSlots::default(),
         };
         let cores = spec.cores.get() as usize;
         Self {
@@ -114,11 +115,6 @@ impl SharedCores {
         }
     }
 
-    /// Latency of a step.
-    pub fn latency(&self) -> f64 {
-        self.speed.alu
-    }
-
     /// The core with most free slots of those that have `count` from `from` on; if none has, the one that has
     /// them first, as far as is known before more warps end.
     pub fn place(&mut self, count: u32, from: f64) -> Option<Place> {
@@ -135,18 +131,15 @@ impl SharedCores {
             return Some(Place { core, at: from });
         }
         let room =
-            |core: usize| Some(Place { core, at: self.cores[core].room_for(count - self.free[core])? });
+            |core: usize| Some(Place { core, at: self.cores[core].later.room_for(count - self.free[core])? });
         (0..self.cores.len()).filter_map(room).min_by(|a, b| a.at.total_cmp(&b.at))
     }
 
     /// Slots of a core that are free by `at` are free.
     fn release_until(&mut self, core: usize, at: f64) {
         let later = &mut self.cores[core].later;
-        while let Some(&(_, count)) = later.front().filter(|(free, _)| *free <= at) {
-            self.free[core] += count;
-            later.pop_front();
-        }
-        self.next_free[core] = later.front().map_or(f64::INFINITY, |(free, _)| *free);
+        self.free[core] += later.take_until(at);
+        self.next_free[core] = later.next().unwrap_or(f64::INFINITY);
     }
 
     /// Slots that warps need which are sent together.
@@ -158,7 +151,7 @@ impl SharedCores {
     pub fn take(&mut self, place: Place, count: u32) {
         let now = count.min(self.free[place.core]);
         self.free[place.core] -= now;
-        self.cores[place.core].take(count - now);
+        self.cores[place.core].later.take(count - now);
         self.release_until(place.core, 0.0);
     }
 
@@ -187,12 +180,6 @@ impl SharedCores {
         }
     }
 
-    /// `count` slots of the core of a place are free from `at` on.
-    pub fn release(&mut self, place: Place, at: f64, count: u32) {
-        self.cores[place.core].release(at, count.min(self.slots));
-        self.next_free[place.core] = self.next_free[place.core].min(at);
-    }
-
     /// When the next warps end, if no more come; infinite if there are none.
     pub fn next_end(&self) -> f64 {
         self.next_end[self.first]
@@ -210,7 +197,8 @@ impl SharedCores {
         core.lanes -= lanes;
         let (now, next) = (core.now, core.next_end(&self.speed));
         let ended = Ended { packet, count, at: now };
-        self.release(Place { core: at, at: now }, now, count);
+        core.later.give(now, count.min(self.slots));
+        self.next_free[at] = self.next_free[at].min(now);
         self.ends_at(at, next);
         Some(ended)
     }
@@ -239,32 +227,6 @@ impl Core {
             }
             self.now = to;
         }
-    }
-
-    /// When `missing` slots more are free; `None` if that is not known.
-    fn room_for(&self, mut missing: u32) -> Option<f64> {
-        self.later.iter().find_map(|&(at, slots)| {
-            missing = missing.saturating_sub(slots);
-            (missing == 0).then_some(at)
-        })
-    }
-
-    /// Take the first slots that become free.
-    fn take(&mut self, mut missing: u32) {
-        while let Some((_, slots)) = self.later.front_mut().filter(|_| missing > 0) {
-            let taken = missing.min(*slots);
-            *slots -= taken;
-            missing -= taken;
-            if *slots == 0 {
-                self.later.pop_front();
-            }
-        }
-    }
-
-    /// Slots become free at `at`.
-    fn release(&mut self, at: f64, count: u32) {
-        let after = self.later.iter().rposition(|&(before, _)| before <= at).map_or(0, |last| last + 1);
-        self.later.insert(after, (at, count));
     }
 }
 

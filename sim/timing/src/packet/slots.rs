@@ -5,63 +5,89 @@ use std::collections::VecDeque;
 use super::calendar::Turn;
 use crate::clock::Time;
 
-/// Slots by the time at which they become free. A warp takes the first that is free. Programs of unequal
-/// length free slots in another order than they took them, so this is no queue.
+/// Slots by the time at which they become free, in order. Programs of unequal length free slots in another order
+/// than they took them, so this is no queue.
+#[derive(Clone, Debug, Default)]
+pub(super) struct FreeSlots<T>(VecDeque<(T, u32)>);
+
+impl<T: Copy + PartialOrd> FreeSlots<T> {
+    /// When the first is free.
+    pub fn next(&self) -> Option<T> {
+        self.0.front().map(|(at, _)| *at)
+    }
+
+    /// When `count` are free, at least 1; `None` if there are fewer.
+    pub fn room_for(&self, count: u32) -> Option<T> {
+        let mut missing = count;
+        self.0.iter().find_map(|&(at, slots)| {
+            missing = missing.saturating_sub(slots);
+            (missing == 0).then_some(at)
+        })
+    }
+
+    /// Take up to `count` of those that are free first.
+    pub fn take(&mut self, count: u32) {
+        let mut missing = count;
+        while let Some((_, slots)) = self.0.front_mut().filter(|_| missing > 0) {
+            let taken = missing.min(*slots);
+            *slots -= taken;
+            missing -= taken;
+            if *slots == 0 {
+                self.0.pop_front();
+            }
+        }
+    }
+
+    /// Take all that are free by `at`. Returns how many.
+    pub fn take_until(&mut self, at: T) -> u32 {
+        let mut taken = 0;
+        while let Some(&(_, slots)) = self.0.front().filter(|(free, _)| *free <= at) {
+            taken += slots;
+            self.0.pop_front();
+        }
+        taken
+    }
+
+    /// `count` more are free at `at`.
+    pub fn give(&mut self, at: T, count: u32) {
+        let after = self.0.partition_point(|(before, _)| *before <= at);
+        match after.checked_sub(1).map(|last| &mut self.0[last]).filter(|(before, _)| *before == at) {
+            Some((_, there)) => *there += count,
+            None => self.0.insert(after, (at, count)),
+        }
+    }
+}
+
+/// Slots as warps see them that come in order. A warp takes the first that is free.
 #[derive(Clone, Debug)]
 pub(super) struct Slots {
-    /// Times in order, and how many slots become free at each.
-    free: VecDeque<(Time, u32)>,
+    free: FreeSlots<Time>,
     count: u32,
 }
 
 impl Slots {
     /// `count` free slots, at least 1.
     pub fn new(count: u32) -> Self {
-        Self { free: VecDeque::from([(0, count)]), count }
+        let mut free = FreeSlots::default();
+        free.give(0, count);
+        Self { free, count }
     }
 
     /// When `warps` slots are free; if there are fewer, when all are.
     pub fn room_for(&self, warps: u32) -> Time {
-        let mut missing = warps.min(self.count);
-        for &(at, slots) in &self.free {
-            if slots >= missing {
-                return at;
-            }
-            missing -= slots;
-        }
-        0
+        self.free.room_for(warps.min(self.count)).unwrap_or(0)
     }
 
     /// Let `warps` warps, at least 1, take the slots that become free first. The first of them is done at
     /// `from`, the last at `to`.
     pub fn hold(&mut self, warps: u32, from: Time, to: Time) {
         let warps_at_once = warps.min(self.count);
-        self.take(warps_at_once);
+        self.free.take(warps_at_once);
         let step = to.saturating_sub(from) / Time::from(warps.max(2) - 1);
         if step == 0 {
-            return self.give(warps_at_once, to);
+            return self.free.give(to, warps_at_once);
         }
-        (0..warps_at_once).for_each(|behind| self.give(1, to - step * Time::from(behind)));
-    }
-
-    fn take(&mut self, warps: u32) {
-        let mut missing = warps;
-        while let Some((_, slots)) = self.free.front_mut().filter(|_| missing > 0) {
-            let taken = missing.min(*slots);
-            *slots -= taken;
-            missing -= taken;
-            if *slots == 0 {
-                self.free.pop_front();
-            }
-        }
-    }
-
-    fn give(&mut self, slots: u32, at: Time) {
-        let after = self.free.partition_point(|(before, _)| *before <= at);
-        match after.checked_sub(1).map(|last| &mut self.free[last]).filter(|(before, _)| *before == at) {
-            Some((_, there)) => *there += slots,
-            None => self.free.insert(after, (at, slots)),
-        }
+        (0..warps_at_once).for_each(|behind| self.free.give(to - step * Time::from(behind), 1));
     }
 }
 
