@@ -6,7 +6,7 @@
 use super::calendar::{Calendar, QueueTimes};
 use super::memory::Memory;
 use super::residents::Residents;
-use super::slots::{Occupancy, Slots, Turns, Wait};
+use super::slots::{Occupancy, Slots, Turns};
 use super::station::{Service, aligned};
 use super::{Span, Visit};
 use crate::clock::{Clocks, Time};
@@ -208,8 +208,8 @@ impl Cores {
             let (chunk, from, slots) =
                 self.next(visit, Chunk { first, count: warps - first, of: warps }, came, from);
             let sent = self.send(kind, from, chunk.count, slots, data_unit);
-            if kind == 1 && came < sent.from {
-                self.note_turns(demand, &chunk, came, sent);
+            if kind == 1 {
+                self.note_turns(&chunk, came, sent);
             }
             let mut ready = Span { from: sent.from + self.period, to: sent.to + self.period };
             if data_unit.is_some() {
@@ -251,15 +251,19 @@ impl Cores {
         (Chunk { count, ..rest }, from, Span { from: free.room_for(1), to: free.room_for(count) })
     }
 
-    /// Record that some warps waited since `since` for slots and were sent at `sent`. A group has all its
-    /// slots at once.
-    fn note_turns(&mut self, demand: &ServiceDemand, chunk: &Chunk, since: Time, sent: Span) {
-        match demand.group {
-            Some(_) if chunk.first == 0 => self.turns.note(Wait { since, sent: sent.from, warps: chunk.of }),
-            Some(_) => {}
-            None => {
-                let sent = |warp| sent.spread(warp, chunk.count);
-                (0..chunk.count).for_each(|warp| self.turns.note(Wait { since, sent: sent(warp), warps: 1 }));
+    /// Record that warps of pixels or a group came at `came` and were sent at `sent`. Vertices wait for a slot as
+    /// well when none of these does: groups come one by one as others leave if they fill all slots.
+    fn note_turns(&mut self, chunk: &Chunk, came: Time, sent: Span) {
+        let mut from = came;
+        match self.residents.was_full() {
+            Some(full) if came <= full.to => from = came.min(full.from),
+            Some(full) => self.turns.note(full),
+            None => {}
+        }
+        for warp in 0..chunk.count {
+            let to = sent.spread(warp, chunk.count);
+            if from < to {
+                self.turns.note(Span { from, to });
             }
         }
     }

@@ -41,6 +41,9 @@ pub(super) struct Residents {
     departed: VecDeque<f64>,
     /// No warp is sent before.
     sent: f64,
+    /// When no slot is free after the last warps took theirs, and when none was before the last [`Self::send`].
+    full: Option<Span>,
+    was_full: Option<Span>,
     /// The place of the last group, and those of the warps that are sent and have not begun.
     group: Option<Place>,
     sending: Vec<Place>,
@@ -67,6 +70,8 @@ impl Residents {
             departures: 0,
             departed: VecDeque::from(vec![0.0; spec.in_flight.get() as usize]),
             sent: 0.0,
+            full: None,
+            was_full: None,
             group: None,
             sending: Vec::new(),
             vertices: VecDeque::new(),
@@ -97,6 +102,7 @@ impl Residents {
     /// last are free. A group has the slots of all its warps at once.
     pub fn send(&mut self, count: u32, from: Time) -> (u32, Span) {
         self.sent = self.sent.max(from as f64);
+        self.was_full = None;
         while self.begin_vertices(self.sent.min(self.cores.next_end())) {}
         let at = |place: &Place| (place.at.round() as Time).max(from);
         if let Some(group) = self.packets.back().filter(|last| last.is_group) {
@@ -115,6 +121,11 @@ impl Residents {
         (if self.group.is_some() { count } else { (self.sending.len() as u32).max(1) }, span)
     }
 
+    /// From when to when no slot was free before the last [`Self::send`], if warps before had taken all.
+    pub fn was_full(&self) -> Option<Span> {
+        self.was_full
+    }
+
     /// Take `count` slots of one core, no earlier than `from`. `None` if there are none and no warp is there to make
     /// room.
     fn take(&mut self, count: u32, from: f64) -> Option<Place> {
@@ -123,9 +134,17 @@ impl Residents {
             let place = self.cores.place(slots, from);
             if place.is_some_and(|place| place.at <= self.cores.next_end()) || !self.end_first(f64::INFINITY)
             {
-                return place.inspect(|&place| self.cores.take(place, slots));
+                return place.inspect(|&place| self.fill(place, slots));
             }
         }
+    }
+
+    /// Take slots at a place, and see whether these were the last.
+    fn fill(&mut self, place: Place, slots: u32) {
+        self.cores.take(place, slots);
+        self.was_full = self.was_full.or(self.full);
+        let until = self.cores.full_until(place.at);
+        self.full = until.map(|until| Span { from: place.at.round() as Time, to: until.round() as Time });
     }
 
     /// The `count` warps that have their slots have their data, the first and the last at `ready`.
@@ -198,6 +217,9 @@ impl Residents {
     /// Serve until warps end, if no more begin. Returns whether some end no later than `to`.
     fn end_first(&mut self, to: f64) -> bool {
         let Some(ended) = self.cores.end_next(to) else { return false };
+        if let Some(full) = &mut self.full {
+            full.to = full.to.min(ended.at.round() as Time);
+        }
         if let Some(packet) = ended.packet {
             self.ended(packet, ended.count, ended.at);
         }
@@ -282,6 +304,19 @@ mod tests {
         let spans = add(&mut residents, &demand(8, 5, Some(group)), 4);
         assert_eq!((spans[0].from, spans[0].to), (30, 30));
         assert_eq!([residents.leave(0), residents.leave(0)], [30, 40]);
+    }
+
+    #[test]
+    fn no_slot_is_free_until_a_warp_ends_whenever_the_next_one_comes() {
+        let mut residents = residents();
+        add(&mut residents, &demand(16, 10, None), 5);
+        assert_eq!(residents.was_full().map(|full| (full.from, full.to)), None);
+        // Four full warps take four cycles per operation.
+        add(&mut residents, &demand(4, 1, None), 99);
+        assert_eq!(residents.was_full().map(|full| (full.from, full.to)), Some((5, 45)));
+        // Three slots are free after that.
+        add(&mut residents, &demand(4, 1, None), 99);
+        assert_eq!(residents.was_full().map(|full| (full.from, full.to)), None);
     }
 
     #[test]

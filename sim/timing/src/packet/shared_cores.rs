@@ -142,6 +142,14 @@ impl SharedCores {
         self.next_free[core] = later.next().unwrap_or(f64::INFINITY);
     }
 
+    /// If no slot is free at `at`, when one is again; infinite if that is not known.
+    pub fn full_until(&self, at: f64) -> Option<f64> {
+        if self.free.iter().any(|free| *free > 0) {
+            return None;
+        }
+        Some(self.next_free.iter().copied().fold(f64::INFINITY, f64::min)).filter(|free| *free > at)
+    }
+
     /// Slots that warps need which are sent together.
     pub fn slots_for(&self, warps: u32) -> u32 {
         warps.min(self.slots)

@@ -2,6 +2,7 @@
 
 use std::collections::VecDeque;
 
+use super::Span;
 use super::calendar::Turn;
 use crate::clock::Time;
 
@@ -157,59 +158,33 @@ impl Occupancy {
     }
 }
 
-/// Most turns that are remembered: those of the packets between the first unit and the cores.
-const MAX_TURNS: usize = 1 << 12;
+/// Most turns that are remembered: those of a pass beside which vertices of the next one run.
+const MAX_TURNS: usize = 1 << 16;
 
-/// Turns of warps that waited for a slot. Where both kinds wait, their warps are sent alternately.
+/// Turns of warps at the slots. Where both kinds wait, their warps are sent alternately.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Turns {
-    waited: VecDeque<Wait>,
-    /// Warps of the other kind that the last one still lets pass.
-    passes: u32,
-}
-
-/// Warps that waited for a slot.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Wait {
-    /// Since when they waited, and when they were sent.
-    pub since: Time,
-    pub sent: Time,
-    /// How many there are. Those of a group have their slots together, and let one of the other kind pass each.
-    pub warps: u32,
-}
+pub(super) struct Turns(VecDeque<Span>);
 
 impl Turns {
-    /// Some were sent, no earlier than those before them.
-    pub fn note(&mut self, wait: Wait) {
-        if self.waited.len() == MAX_TURNS {
-            self.waited.pop_front();
+    /// From `wait.from` on warps had to wait; at `wait.to` one was sent or could be, no earlier than at those before.
+    pub fn note(&mut self, wait: Span) {
+        if self.0.len() == MAX_TURNS {
+            self.0.pop_front();
         }
-        self.waited.push_back(wait);
+        self.0.push_back(wait);
     }
 
     /// When a warp of the other kind is sent that waits since `came` and could be sent at `at`, both no
     /// earlier than for those before it: after those that wait already, were not sent before it came, and
-    /// have not yet let others pass.
+    /// have not yet let one pass.
     pub fn after(&mut self, came: Time, at: Time) -> Time {
-        while self.waited.front().is_some_and(|wait| wait.sent < came) {
-            self.waited.pop_front();
+        while self.0.front().is_some_and(|wait| wait.to < came) {
+            self.0.pop_front();
         }
-        let waits = self.waited.front().filter(|wait| wait.since <= at).copied();
-        match waits {
-            Some(_) if self.passes > 0 => {
-                self.passes -= 1;
-                at
-            }
-            Some(wait) => {
-                self.waited.pop_front();
-                self.passes = wait.warps - 1;
-                wait.sent.max(at)
-            }
-            None => {
-                self.passes = 0;
-                at
-            }
-        }
+        let Some(wait) = self.0.front().filter(|wait| wait.from <= at) else { return at };
+        let sent = wait.to.max(at);
+        self.0.pop_front();
+        sent
     }
 }
 
@@ -259,15 +234,15 @@ mod tests {
     #[test]
     fn warps_of_two_kinds_that_wait_are_sent_alternately() {
         let mut turns = Turns::default();
-        for (since, sent, warps) in [(0, 10, 1), (10, 20, 1), (20, 30, 2), (25, 40, 1), (70, 90, 1)] {
-            turns.note(Wait { since, sent, warps });
+        for (from, to) in [(0, 10), (10, 20), (20, 30), (25, 40), (70, 90)] {
+            turns.note(Span { from, to });
         }
-        // Those that wait since 5 go after one each, and two after the two that are sent together. At 50 none waits.
+        // Those that wait since 5 go after one each. At 50 none waits.
         let mut at = 0;
-        let found = [5, 5, 5, 5, 5, 50, 80].map(|came| {
+        let found = [5, 5, 5, 5, 50, 80].map(|came| {
             at = turns.after(came, came.max(at));
             at
         });
-        assert_eq!(found, [10, 20, 30, 30, 40, 50, 90]);
+        assert_eq!(found, [10, 20, 30, 40, 50, 90]);
     }
 }
