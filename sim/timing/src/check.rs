@@ -1,8 +1,9 @@
 //! A check of a fast level by `stepped`: both time the same few slices of the stream of packets.
 //!
 //! Sampled simulation (Wunderlich et al. 2003, SMARTS) estimates the time of a program from detailed simulation
-//! of short, evenly spread parts of it. Here the parts estimate the error of a faster level: its time of all
-//! slices over that of the reference, minus one. At either level a slice begins on an empty machine.
+//! of short parts of it. Here the parts estimate the error of a faster level. Packets differ in length, so the
+//! parts are drawn with a probability that is proportional to their time, roughly, by `bound` (Hansen and
+//! Hurwitz 1943). At any level a slice begins on an empty machine.
 
 use activity::{LineAccess, Packet, PacketBuffer};
 use warnings::{Code, Warning};
@@ -10,17 +11,15 @@ use warnings::{Code, Warning};
 use crate::{FrameClock, Level, Machine, Recorder, TimingError};
 
 /// Most packets of a slice.
-const SLICE: usize = 512;
-/// Most slices that are timed, and that are kept until the length of the stream is known.
-const SLICES: usize = 4;
-const KEPT: usize = 4 * SLICES;
-/// The check takes one packet of so many, but at least a slice.
-const SHARE: usize = 32;
+const SLICE: usize = 256;
 /// Most lines of a slice.
 const SLICE_LINES: usize = 16 * SLICE;
-/// A slice takes about one cycle of the frame of so many, or this many cycles if that is more.
+/// Most slices that are kept, and how often one of them is drawn.
+const KEPT: usize = 32;
+const DRAWS: usize = 4;
+/// All draws take one core cycle of the frame of so many, or each takes this many cycles if that is more.
 const CYCLE_SHARE: u64 = 8;
-const MIN_CYCLES: u64 = 1 << 15;
+const MIN_CYCLES: u64 = 1 << 14;
 
 /// What a check of a frame found.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -104,7 +103,7 @@ impl Slices {
         self.packets += 1;
     }
 
-    /// The error of `level` on the slices; `None` if they take no time.
+    /// The error of `level`, by which the frame takes `of_frame` cycles; `None` without packets.
     ///
     /// # Errors
     /// Those of [`FrameClock::finish`].
@@ -114,33 +113,47 @@ impl Slices {
         machine: Machine<'_>,
         of_frame: u64,
     ) -> Result<Option<Checked>, TimingError> {
-        let limit = MIN_CYCLES.max(of_frame / CYCLE_SHARE);
-        let (mut packets, mut fast, mut exact) = (0, 0, 0);
-        for slice in self.chosen() {
+        let limit = MIN_CYCLES.max(of_frame / (CYCLE_SHARE * DRAWS as u64));
+        let (mut packets, mut fast, mut exact) = (0, 0.0, 0.0);
+        for (slice, draws) in self.draw(machine)? {
             let mut most = slice.len();
             let mut timed = cycles(slice, most, level, machine)?;
             if timed > limit {
                 most = (most as u64 * limit / timed).max(1) as usize;
                 timed = cycles(slice, most, level, machine)?;
             }
+            let weight = draws as f64 / cycles(slice, most, Level::Bound, machine)?.max(1) as f64;
             packets += most;
-            fast += timed;
-            exact += cycles(slice, most, Level::Stepped, machine)?;
+            fast += weight * timed as f64;
+            exact += weight * cycles(slice, most, Level::Stepped, machine)? as f64;
         }
-        Ok((exact > 0).then(|| Checked {
-            packets,
-            of: self.packets,
-            error: fast as f64 / exact as f64 - 1.0,
-        }))
+        Ok((exact > 0.0).then(|| Checked { packets, of: self.packets, error: fast / exact - 1.0 }))
     }
 
-    /// The slices to time, from the middles of equal parts of the stream. A last slice may be short, so it is
-    /// not among them if there are others.
-    fn chosen(&self) -> impl Iterator<Item = &PacketBuffer> {
-        let whole = (self.packets / self.every).clamp(1, self.kept.len().max(1));
-        let count = (self.packets / SHARE / SLICE).clamp(1, SLICES);
-        (0..count).filter_map(move |number| self.kept.get((2 * number + 1) * whole / (2 * count)))
+    /// Slices that are drawn, and how often each is: the part of the frame that each slice stands for is as
+    /// long as its packets take at `bound`.
+    fn draw(&self, machine: Machine<'_>) -> Result<Vec<(&PacketBuffer, usize)>, TimingError> {
+        let mut lengths = Vec::with_capacity(self.kept.len());
+        for (slice, number) in self.kept.iter().zip(0..) {
+            let stands_for = self.every.min(self.packets - number * self.every) as f64 / slice.len() as f64;
+            let length = cycles(slice, slice.len(), Level::Bound, machine)?.max(1) as f64;
+            lengths.push(length * stands_for);
+        }
+        let drawn = self.kept.iter().zip(systematic(&lengths));
+        Ok(drawn.filter(|(_, draws)| *draws > 0).collect())
     }
+}
+
+/// How often each part is drawn if [`DRAWS`] points lie evenly in all of them.
+fn systematic(lengths: &[f64]) -> impl Iterator<Item = usize> {
+    let all: f64 = lengths.iter().sum();
+    let (mut sum, mut before) = (0.0, 0);
+    lengths.iter().map(move |length| {
+        sum += length;
+        // Points are at odd multiples of half a step.
+        let points = (sum / all * DRAWS as f64 + 0.5) as usize;
+        points - std::mem::replace(&mut before, points)
+    })
 }
 
 #[cfg(test)]
@@ -159,20 +172,29 @@ mod tests {
     }
 
     #[test]
-    fn slices_come_from_the_middles_of_equal_parts() {
+    fn slices_are_evenly_spread_whatever_the_length_of_the_stream() {
         let of = |packets| -> Vec<(u32, usize)> {
-            let slices = slices(packets);
-            assert!(slices.kept.len() <= KEPT);
             let first = |slice: &PacketBuffer| slice.iter().next().unwrap().0.triangle;
-            slices.chosen().map(|slice| (first(slice), slice.len())).collect()
+            slices(packets).kept.iter().map(|slice| (first(slice), slice.len())).collect()
         };
-        assert_eq!(of(100), [(0, 100)]);
-        assert_eq!(of(1100), [(512, 512)]);
-        assert_eq!(of(8 * 512 + 1), [(2048, 512)]);
-        assert_eq!(of(16 * 512), [(4096, 512)]);
-        let middle = |part: u32| (part * 16_384 + 8192, SLICE);
-        assert_eq!(of(65_536 + 5), [0, 1, 2, 3].map(middle));
         assert!(of(0).is_empty());
+        assert_eq!(of(100), [(0, 100)]);
+        assert_eq!(of(300), [(0, 256), (256, 44)]);
+        assert_eq!(of(32 * 256).len(), 32);
+        let every =
+            |step: u32, count: u32| -> Vec<_> { (0..count).map(|slice| (slice * step, SLICE)).collect() };
+        assert_eq!(of(32 * 256 + 512), every(512, 17));
+        assert_eq!(of(100 * 1024), every(4096, 25));
+    }
+
+    #[test]
+    fn parts_are_drawn_as_often_as_they_are_long() {
+        let of = |lengths: &[f64]| systematic(lengths).collect::<Vec<_>>();
+        assert_eq!(of(&[7.0]), [4]);
+        assert_eq!(of(&[1.0; 4]), [1; 4]);
+        assert_eq!(of(&[1.0; 12]), [0, 1, 0].repeat(4));
+        assert_eq!(of(&[1.0, 98.0, 1.0]), [0, 4, 0]);
+        assert!(of(&[]).is_empty());
     }
 
     #[test]
