@@ -2,10 +2,10 @@
 //! cycles and its energy may be from those at timing level `stepped`.
 //!
 //! Stated errors are factors: an error of 0.05 says that the number at `stepped` is at most 1.05 times as
-//! large and at least 1/1.05 times. They are quantiles of errors that were measured on GPUs drawn at random,
-//! apart for each level, with and without its accuracy warnings, so that they hold for 95 % of runs that are
-//! like those (split conformal prediction by groups; Papadopoulos et al. 2002, Vovk, Gammerman and Shafer
-//! 2005). `quintile chart stated-errors` measures them, and how often they hold.
+//! large and at least 1/1.05 times. The stated error is what the check of a frame finds, and a margin: by so
+//! much or less the errors of 95 % of runs on GPUs drawn at random were larger than what their checks found
+//! (split conformal prediction; Papadopoulos et al. 2002, Vovk, Gammerman and Shafer 2005).
+//! `quintile chart stated-errors` measures the margins, and how often stated errors hold.
 
 use std::sync::OnceLock;
 
@@ -319,7 +319,7 @@ const TABLE: &str = include_str!("../stated_errors.csv");
 /// Share of runs whose error is within the stated one.
 pub const CONFIDENCE: f64 = 0.95;
 
-/// Stated error of a run, as a factor less one.
+/// Stated error of a run, as a factor less one. Infinite without a bound, as `null` in JSON.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct StatedError {
     /// Of cycles.
@@ -342,11 +342,17 @@ fn table() -> &'static [Row] {
 }
 
 impl StatedError {
+    /// Without a bound.
+    const UNKNOWN: Self = Self { cycles: f64::INFINITY, energy: f64::INFINITY };
+
     /// Stated error of a frame at a level whose check found the relative error `checked`.
     pub fn of(level: Level, checked: f64) -> Self {
         let found = error_size(libm::log1p(checked));
+        if level == Level::Stepped {
+            return Self::default();
+        }
         let row = table().iter().find(|row| row.level == level);
-        row.map_or_else(Self::default, |row| Self { cycles: found + row.cycles, energy: found + row.energy })
+        row.map_or(Self::UNKNOWN, |row| Self { cycles: found + row.cycles, energy: found + row.energy })
     }
 
     /// Stated error of the sum over `frames`: the mean of those of simulated frames, by time, as errors of
@@ -372,7 +378,11 @@ impl StatedError {
 
     /// A line for the terminal and the report.
     pub fn line(&self) -> String {
-        format!("cycles {:.1} %, energy {:.1} %", 100.0 * self.cycles, 100.0 * self.energy)
+        let percent = |error: f64| match error.is_finite() {
+            true => format!("{:.1} %", 100.0 * error),
+            false => "unknown".to_owned(),
+        };
+        format!("cycles {}, energy {}", percent(self.cycles), percent(self.energy))
     }
 }
 
@@ -392,7 +402,7 @@ mod tests {
         for row in table() {
             let at = |checked| StatedError::of(row.level, checked);
             assert_eq!([at(0.0).cycles, at(0.0).energy], [row.cycles, row.energy]);
-            assert!(row.cycles > 0.0 && row.energy > 0.0);
+            assert!([row.cycles, row.energy].iter().all(|margin| *margin > 0.0 && margin.is_finite()));
             // A fifth too short: the truth is a quarter longer.
             assert!((at(-0.2).cycles - row.cycles - 0.25).abs() < 1e-12);
             assert!((at(0.25).energy - row.energy - 0.25).abs() < 1e-12);
@@ -405,5 +415,6 @@ mod tests {
         let sum = StatedError { cycles: 0.01, energy: 0.02 }.beside(0.03, 0.05);
         assert!((sum.cycles - 0.04).abs() < 1e-15 && (sum.energy - 0.07).abs() < 1e-15);
         assert_eq!(sum.line(), "cycles 4.0 %, energy 7.0 %");
+        assert_eq!(StatedError::UNKNOWN.line(), "cycles unknown, energy unknown");
     }
 }

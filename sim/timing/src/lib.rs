@@ -4,8 +4,8 @@
 //! - [`MachineSpec`]: throughput, latency, queues and clocks of the units of the block diagram.
 //! - [`DemandBuilder`] and [`ServiceDemand`]: cycles that a packet needs at each station, the same for all
 //!   levels.
-//! - [`Level`] and [`FrameClock`]: the levels, and a clock for any of them; [`Checked`]: how far a level is off on
-//!   parts of a frame.
+//! - [`Level`] and [`FrameClock`]: the levels, and a clock for any of them; [`Slices`] and [`Checked`]: how far a
+//!   level is off, by parts of a frame.
 //! - [`stepped`]: the reference, cycle by cycle.
 //! - [`PacketClock`]: a recurrence over packets, with calendars for shared resources.
 //! - [`BoundClock`]: a roofline over segments of the stream, from [`Totals`] gathered while packets arrive.
@@ -45,12 +45,11 @@ pub mod streams;
 use activity::{LineAccess, Packet, PacketBuffer};
 use serde::{Deserialize, Serialize};
 
-use check::Slices;
 use packet::MAX_CYCLES;
 use stepped::{Stalled, StepOptions, Stream};
 
 pub use bound::{BoundClock, Totals, bound};
-pub use check::Checked;
+pub use check::{Checked, Slices};
 pub use clock::{Clocks, Time};
 pub use demand::{CLIENTS, CYCLE, DemandBuilder, ServiceDemand, Station, Work};
 pub use draws::{DrawSpan, PassTime};
@@ -77,7 +76,7 @@ pub struct Timed {
     pub unit_cycles: u64,
     /// Packets of the stream.
     pub packets: u64,
-    /// What the check of the level found; only from [`FrameClock::checked`].
+    /// What the check of the level found; only from [`FrameClock::finish_checked`], and `None` at `stepped`.
     pub checked: Option<Checked>,
     /// The passes of the frame, by number.
     pub passes: Vec<PassTime>,
@@ -143,14 +142,22 @@ pub struct Machine<'a> {
 pub struct FrameClock<'a> {
     machine: Machine<'a>,
     state: State,
-    /// The level to check, and what it is checked on.
-    check: Option<(Level, Slices)>,
 }
 
 enum State {
     Stepped(Box<(DemandBuilder, Stream, Recorder)>),
     Packet(Box<PacketClock>),
     Bound(Box<BoundClock>),
+}
+
+impl State {
+    const fn level(&self) -> Level {
+        match self {
+            Self::Stepped(_) => Level::Stepped,
+            Self::Packet(_) => Level::Packet,
+            Self::Bound(_) => Level::Bound,
+        }
+    }
 }
 
 impl<'a> FrameClock<'a> {
@@ -164,20 +171,11 @@ impl<'a> FrameClock<'a> {
             Level::Packet => State::Packet(Box::new(PacketClock::new(units, clocks, recorder))),
             Level::Bound => State::Bound(Box::new(BoundClock::new(units, clocks, recorder))),
         };
-        Self { machine, state, check: None }
-    }
-
-    /// The same, and the level is checked: [`Timed::checked`]. `stepped` is the reference and needs no check.
-    pub fn checked(level: Level, machine: Machine<'a>, recorder: Recorder) -> Self {
-        let check = (level != Level::Stepped).then(|| (level, Slices::new()));
-        Self { check, ..Self::new(level, machine, recorder) }
+        Self { machine, state }
     }
 
     /// Add the next packet of the stream and the lines it requests from the L2.
     pub fn push(&mut self, packet: &Packet, lines: &[LineAccess]) {
-        if let Some((_, slices)) = &mut self.check {
-            slices.push(packet, lines);
-        }
         match &mut self.state {
             State::Stepped(state) => state.1.push(&mut state.0, packet, lines),
             State::Packet(clock) => clock.push(packet, lines),
@@ -201,18 +199,25 @@ impl<'a> FrameClock<'a> {
     /// # Errors
     /// [`TimingError::Stalled`] is an error of the model; [`TimingError::TooLong`] limits the level `packet`.
     pub fn finish(self) -> Result<Timed, TimingError> {
-        let Self { machine, state, check } = self;
-        let timed = match state {
+        let Machine { units, clocks } = self.machine;
+        Ok(match self.state {
             State::Stepped(state) => {
                 let (builder, stream, recorder) = *state;
-                let options = StepOptions::default();
-                stepped::run(machine.units, machine.clocks, &builder, &stream, recorder, &options)?
+                stepped::run(units, clocks, &builder, &stream, recorder, &StepOptions::default())?
             }
             State::Packet(clock) if clock.is_too_long() => return Err(TimingError::TooLong),
             State::Packet(clock) => clock.finish(),
             State::Bound(clock) => clock.finish(),
-        };
-        let check = check.map(|(level, slices)| slices.check(level, machine, timed.cycles)).transpose()?;
-        Ok(Timed { checked: check.flatten(), ..timed })
+        })
+    }
+
+    /// The same, with a check of the level by slices of the stream: [`Timed::checked`].
+    ///
+    /// # Errors
+    /// See [`Self::finish`].
+    pub fn finish_checked(self, slices: &Slices) -> Result<Timed, TimingError> {
+        let (machine, level) = (self.machine, self.state.level());
+        let timed = self.finish()?;
+        Ok(Timed { checked: slices.check(level, machine, timed.cycles)?, ..timed })
     }
 }

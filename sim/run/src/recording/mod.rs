@@ -8,7 +8,7 @@ use activity::{PacketBuffer, PacketStream, StreamError, StreamWriter};
 use output::terminal::Progress;
 use power_model::PowerModel;
 use rayon::prelude::*;
-use timing::{FrameClock, Recorder, Timed};
+use timing::{FrameClock, Recorder, Slices, Timed};
 
 pub use file::RecordedRun;
 
@@ -66,11 +66,12 @@ impl DrawnFrames {
         let time = |recorded: &RecordedFrame| {
             let clocks = plans.iter().map(|plan| {
                 let recorder = Recorder::new(BIN_PS, max_bins);
-                Ok(FrameClock::checked(plan.options.level(), plan.gpu.machine()?, recorder))
+                Ok(FrameClock::new(plan.options.level(), plan.gpu.machine()?, recorder))
             });
             let mut clocks = clocks.collect::<Result<Vec<_>, RunError>>()?;
-            push_all(&recorded.packets, &mut clocks)?;
-            Ok(clocks.into_iter().map(FrameClock::finish).collect::<Result<Vec<Timed>, _>>()?)
+            let slices = push_all(&recorded.packets, &mut clocks)?;
+            let finish = |clock: FrameClock<'_>| Ok(clock.finish_checked(&slices)?);
+            clocks.into_iter().map(finish).collect::<Result<Vec<Timed>, RunError>>()
         };
         let frames = self.frames.par_iter().map(time).collect::<Result<Vec<_>, RunError>>()?;
         let mut timed: Vec<_> =
@@ -88,18 +89,19 @@ pub const MACHINES_IN_TURN: usize = 8;
 /// Number of packets that one clock takes before the next does: few enough to stay in a cache of the host.
 const PACKETS_IN_TURN: usize = 256;
 
-/// Sends all packets to each of the clocks.
-fn push_all(stream: &PacketStream, clocks: &mut [FrameClock<'_>]) -> Result<(), StreamError> {
-    let mut buffer = PacketBuffer::default();
+/// Sends all packets to each of the clocks. Returns slices of them, for a check of all.
+fn push_all(stream: &PacketStream, clocks: &mut [FrameClock<'_>]) -> Result<Slices, StreamError> {
+    let (mut buffer, mut slices) = (PacketBuffer::default(), Slices::default());
     stream.replay(|packet, lines| {
         buffer.push(packet, lines);
+        slices.push(packet, lines);
         if buffer.len() == PACKETS_IN_TURN {
             clocks.iter_mut().for_each(|clock| clock.push_all(&buffer));
             buffer.clear();
         }
     })?;
     clocks.iter_mut().for_each(|clock| clock.push_all(&buffer));
-    Ok(())
+    Ok(slices)
 }
 
 /// Frames of a recording with their times on a machine.

@@ -131,5 +131,5 @@ fn packet_is_close_on_random_gpus_or_warns() {
     assert!(errors[errors.len() / 2] < 2.0, "median {}", errors[errors.len() / 2]);
     let is_far = |pair: &&Pair| pair.packet.0.abs() > 8.0 && !pair.packet.1;
     let far: Vec<_> = all.iter().filter(is_far).map(|pair| (pair.seed, pair.name)).collect();
-    assert_eq!(far, FAR);
+    assert_eq!(far, []);
 }

@@ -244,6 +244,7 @@ impl StatedErrorsChart {
             .data("subject", |row| row.subject.as_str())
             .data("gpu", |row| row.gpu)
             .data("level", |row| row.level.name())
+            .data("warns", |row| row.warns.to_string())
             .data("checked_log", |row| row.checked_log)
             .data("cycles_log", |row| row.cycles_log)
             .data("energy_log", |row| row.energy_log)

@@ -21,7 +21,7 @@ use traces::stats::Random;
 
 use super::timing::animations;
 use super::timing::animations::Subject;
-use super::timing::measure::{Written, checked, power_model, timed};
+use super::timing::measure::{Written, power_model, timed};
 use crate::study::table::Sheet;
 use crate::study::{Gallery, Study, StudyError};
 
@@ -181,7 +181,7 @@ fn errors(
     let (truth, stepped_j) = cost(Level::Stepped)?;
     let row = |level: Level| {
         let (found, energy_j) = cost(level)?;
-        let checked = checked(level, spec, stream)?;
+        let checked = written.check(level, spec, found.cycles)?;
         Ok(ErrorRow {
             subject: subject.name().to_owned(),
             subject_number,

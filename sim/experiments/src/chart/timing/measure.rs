@@ -10,8 +10,8 @@ use run::{GpuSpec, RunError, cheapest_level};
 use serde::Serialize;
 use timing::stepped::{self, StepOptions, Stream};
 use timing::{
-    Checked, Clocks, DemandBuilder, FrameClock, Level, PacketClock, Recorder, Timed, TimingError, Totals,
-    bound, streams,
+    Checked, Clocks, DemandBuilder, FrameClock, Level, PacketClock, Recorder, Slices, Timed, TimingError,
+    Totals, bound, streams,
 };
 
 use super::Reference;
@@ -115,7 +115,7 @@ pub(super) fn rows(
         for _ in 1..TIMES {
             cpu_s = cpu_s.min(timed(level, gpu, &written)?.1);
         }
-        let (found_power, check) = (power(&found)?, checked(level, gpu, stream)?);
+        let (found_power, check) = (power(&found)?, written.check(level, gpu, found.cycles)?);
         rows.push(TimingRow {
             scene: scene.to_owned(),
             kind,
@@ -147,6 +147,7 @@ pub(in crate::chart) struct Written {
     builder: DemandBuilder,
     stream: Stream,
     totals: Totals,
+    slices: Slices,
     cpu_s: f64,
 }
 
@@ -160,7 +161,15 @@ impl Written {
             stream.push(&mut builder, packet, lines);
             stream.add_last(&builder, &mut totals);
         }
-        Ok(Self { clocks, builder, stream, totals, cpu_s: started.elapsed().as_secs_f64() })
+        let cpu_s = started.elapsed().as_secs_f64();
+        let mut slices = Slices::default();
+        packets.iter().for_each(|(packet, lines)| slices.push(packet, lines));
+        Ok(Self { clocks, builder, stream, totals, slices, cpu_s })
+    }
+
+    /// The check of a level by which the frame takes so many cycles.
+    pub fn check(&self, level: Level, gpu: &GpuSpec, cycles: u64) -> Result<Option<Checked>, RunError> {
+        Ok(self.slices.check(level, gpu.machine()?, cycles)?)
     }
 }
 
@@ -182,17 +191,6 @@ pub(in crate::chart) fn timed(
         Level::Bound => bound(&gpu.units, *clocks, totals, recorder),
     };
     Ok((timed, started.elapsed().as_secs_f64()))
-}
-
-/// The check of a level on a frame.
-pub(in crate::chart) fn checked(
-    level: Level,
-    gpu: &GpuSpec,
-    packets: &PacketBuffer,
-) -> Result<Option<Checked>, RunError> {
-    let mut clock = FrameClock::checked(level, gpu.machine()?, Recorder::new(BIN_PS, MAX_BINS));
-    clock.push_all(packets);
-    Ok(clock.finish()?.checked)
 }
 
 fn percent(found: f64, truth: f64) -> f64 {
@@ -265,9 +263,13 @@ pub(super) fn added(subject: &Subject, gpu: &GpuSpec) -> Result<Vec<AddedRow>, R
     let drawn_s = fastest(|| subject.render(gpu, |_, _| {}))?;
     let row = |level| {
         let timed_s = fastest(|| {
-            let mut clock = FrameClock::checked(level, gpu.machine()?, Recorder::new(BIN_PS, MAX_BINS));
-            subject.render(gpu, |packet, lines| clock.push(packet, lines))?;
-            clock.finish()?;
+            let mut clock = FrameClock::new(level, gpu.machine()?, Recorder::new(BIN_PS, MAX_BINS));
+            let mut slices = Slices::default();
+            subject.render(gpu, |packet, lines| {
+                clock.push(packet, lines);
+                slices.push(packet, lines);
+            })?;
+            clock.finish_checked(&slices)?;
             Ok(())
         })?;
         let added_percent = (timed_s / drawn_s - 1.0) * 100.0;
