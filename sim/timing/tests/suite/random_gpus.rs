@@ -64,9 +64,6 @@ fn drawn(seed: u64) -> Gpu {
     gpu
 }
 
-/// Streams by GPU on which `packet` is more than 8 % off and does not warn: what was found of 120.
-const FAR: [(u64, &str); 1] = [(8, "passes in a chain")];
-
 /// What `packet` and `bound` say of a stream on a GPU.
 struct Pair {
     seed: u64,
