@@ -11,7 +11,7 @@ use run::{
     passes_of, warnings_of,
 };
 use serde::{Deserialize, Serialize};
-use warnings::Code;
+use timing::Checked;
 
 use crate::setting::{self, Setting};
 
@@ -197,7 +197,7 @@ pub fn measured(plan: &Plan, distinct: Vec<RunFrame>, groups: &[usize]) -> Resul
         nj_per_pixel: frame_j / plan.pixels() as f64 * 1e9,
         dram_bytes: bytes(Event::DramReadBytes) + bytes(Event::DramWriteBytes),
         area_mm2: [area.nominal, area.low, area.high],
-        accuracy_warnings: joined(checked.filter(|of| of.is_far()).map(|_| Code::TimingInaccurate.name())),
+        accuracy_warnings: joined(checked.filter(|of| of.is_far()).map(|_| Checked::CODE.name())),
         warnings: joined(warnings_of(plan, &simulated, &paced).iter().map(|warning| warning.code.name())),
         cycles_error: stated.cycles,
         energy_error: stated.energy,

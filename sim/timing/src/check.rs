@@ -37,7 +37,9 @@ pub struct Checked {
 }
 
 impl Checked {
-    /// Least error of a check that is worth a warning.
+    /// The warning about a level that is far off.
+    pub const CODE: Code = Code::TimingInaccurate;
+    /// Least error of a check that is worth it.
     pub const FAR: f64 = 0.08;
 
     /// Whether the level is so far off that a run warns.
@@ -60,7 +62,7 @@ impl Checked {
         };
         let than = if error < 0.0 { "short" } else { "long" };
         Warning::new(
-            Code::TimingInaccurate,
+            Self::CODE,
             format!(
                 "`{name}` is about {:.1} % too {than}, by {packets} of {of} packets of frame {frame} that `stepped` timed, too: times \
                  and energies may be as far off; {remedy}",
@@ -184,15 +186,20 @@ fn systematic(lengths: &[f64]) -> impl Iterator<Item = usize> {
 
 #[cfg(test)]
 mod tests {
-    use activity::{LineKind, PacketKind, Unit};
+    use activity::{LineKind, Unit};
 
     use super::*;
 
+    fn packet() -> Packet {
+        crate::streams::rates()[0].packets[0].0
+    }
+
     /// A stream of packets, each with its number as the number of its triangle.
     fn slices(packets: u32) -> Slices {
-        let mut slices = Slices::default();
+        let (mut packet, mut slices) = (packet(), Slices::default());
         for triangle in 0..packets {
-            slices.push(&Packet { triangle, ..Packet::new(PacketKind::Tile, 0) }, &[]);
+            packet.triangle = triangle;
+            slices.push(&packet, &[]);
         }
         slices
     }
@@ -256,7 +263,7 @@ mod tests {
     fn a_slice_ends_with_its_lines() {
         let mut slices = Slices::default();
         let lines = vec![LineAccess::new(Unit::Texture, 0, LineKind::Fetch); SLICE_LINES / 2];
-        (0..9).for_each(|_| slices.push(&Packet::new(PacketKind::Tile, 0), &lines));
+        (0..9).for_each(|_| slices.push(&packet(), &lines));
         assert_eq!((slices.kept[0].len(), slices.kept[0].line_count()), (2, SLICE_LINES));
     }
 
