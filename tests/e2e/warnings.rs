@@ -247,7 +247,7 @@ fn warnings_of_the_page_are_as_listed() {
         // The whole default run takes too long for a test; part of it is used.
         let (scene, args) = match args.split_first() {
             Some((scene, args)) => (*scene, args.to_vec()),
-            None => ("default", vec!["--frames", "17..19", "--timing", "bound"]),
+            None => ("default", vec!["--frames", "17..19"]),
         };
         let codes = quintile().run(scene, &args).warning_codes();
         assert_eq!(codes.join(" "), promised, "{command}");
