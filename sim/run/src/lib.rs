@@ -74,7 +74,7 @@ pub use recording::{DrawnFrames, MACHINES_IN_TURN, RecordedRun, TimedFrames};
 pub use sampled::{Forecast, FramePreview, Previewer, Previews, Signatures};
 pub use simulated::{
     CONFIDENCE, FrameCost, Modelled, Observed, Origin, RunFrame, RunQuantity, SampledSummary, Simulated,
-    StatedError, error_size,
+    StatedError,
 };
 pub use summary::{Detection, Figures, FrameRow, Summary};
 pub use visibility::{ImageRow, ImagesSummary};

@@ -15,7 +15,7 @@ use pipeline::FrameReport;
 use power_model::FramePower;
 use serde::{Deserialize, Serialize};
 use timing::sampled::Interval;
-use timing::{Checked, DrawSpan, Level, PassTime, Stalls};
+use timing::{Checked, DrawSpan, Level, PassTime, Stalls, error_size};
 use warnings::Warning;
 use workloads::Regime;
 use workloads::job::Fact;
@@ -345,14 +345,16 @@ impl StatedError {
     /// Without a bound.
     const UNKNOWN: Self = Self { cycles: f64::INFINITY, energy: f64::INFINITY };
 
-    /// Stated error of a frame at a level whose check found the relative error `checked`.
-    pub fn of(level: Level, checked: f64) -> Self {
-        let found = error_size(libm::log1p(checked));
+    /// Stated error of a frame at a level whose check found the relative error `checked`; unknown without one.
+    pub fn of(level: Level, checked: Option<f64>) -> Self {
         if level == Level::Stepped {
             return Self::default();
         }
         let row = table().iter().find(|row| row.level == level);
-        row.map_or(Self::UNKNOWN, |row| Self { cycles: found + row.cycles, energy: found + row.energy })
+        row.zip(checked).map_or(Self::UNKNOWN, |(row, checked)| {
+            let found = error_size(libm::log1p(checked));
+            Self { cycles: found + row.cycles, energy: found + row.energy }
+        })
     }
 
     /// Stated error of the sum over `frames`: the mean of those of simulated frames, by time, as errors of
@@ -361,7 +363,7 @@ impl StatedError {
         let (mut sum, mut time_s) = (Self::default(), 0.0);
         for frame in frames {
             let Some(Observed { checked, .. }) = frame.observed() else { continue };
-            let found = checked.map_or(0.0, |checked| checked.error);
+            let found = checked.map(|checked| checked.error);
             let (of, frame_s) = (Self::of(level, found), frame.power.duration_s());
             sum = Self { cycles: sum.cycles + of.cycles * frame_s, energy: sum.energy + of.energy * frame_s };
             time_s += frame_s;
@@ -386,28 +388,26 @@ impl StatedError {
     }
 }
 
-/// Size of an error from the logarithm of a ratio: 0.05 for 1.05 and for 1/1.05.
-pub fn error_size(log: f64) -> f64 {
-    libm::expm1(log.abs())
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
     fn the_error_of_a_frame_is_that_of_its_check_and_a_margin() {
-        assert_eq!(StatedError::of(Level::Stepped, 0.0), StatedError::default());
+        assert_eq!(StatedError::of(Level::Stepped, None), StatedError::default());
         assert_eq!(table().len(), 2);
         for row in table() {
-            let at = |checked| StatedError::of(row.level, checked);
+            let at = |checked| StatedError::of(row.level, Some(checked));
             assert_eq!([at(0.0).cycles, at(0.0).energy], [row.cycles, row.energy]);
             assert!([row.cycles, row.energy].iter().all(|margin| *margin > 0.0 && margin.is_finite()));
             // A fifth too short: the truth is a quarter longer.
             assert!((at(-0.2).cycles - row.cycles - 0.25).abs() < 1e-12);
             assert!((at(0.25).energy - row.energy - 0.25).abs() < 1e-12);
         }
-        assert!(StatedError::of(Level::Packet, 0.0).cycles < StatedError::of(Level::Bound, 0.0).cycles);
+        assert!(
+            StatedError::of(Level::Packet, Some(0.0)).cycles
+                < StatedError::of(Level::Bound, Some(0.0)).cycles
+        );
     }
 
     #[test]

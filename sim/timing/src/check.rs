@@ -1,58 +1,70 @@
-//! A check of a fast level by `stepped`: both time the same few slices of the stream of packets.
+//! A check of a fast level by the next more exact one, up to `stepped`: both time the same few slices of the stream
+//! of packets, and all of it if they differ there.
 //!
 //! Sampled simulation (Wunderlich et al. 2003, SMARTS) estimates the time of a program from detailed simulation
 //! of short parts of it. Here the parts estimate the error of a faster level. Packets differ in length, so parts
-//! are chosen at even distances of time, by `packet` (systematic sampling with unequal probabilities, Madow
-//! 1949). At any level a slice begins on an empty machine.
+//! are chosen at even distances of weight, which is about the work of timing them (systematic sampling with
+//! unequal probabilities, Madow 1949). At any level a slice begins on an empty machine.
 
 use activity::{LineAccess, Packet, PacketBuffer};
 use warnings::{Code, Warning};
 
 use crate::{FrameClock, Level, Machine, Recorder, TimingError};
 
-/// Most packets of a slice.
-const SLICE_PACKETS: usize = 256;
-/// Most lines of a slice.
-const SLICE_LINES: usize = 16 * SLICE_PACKETS;
-/// Most slices that are kept.
-const MAX_SLICES: usize = 32;
-/// Points in the time of the frame at which a slice is chosen.
-const POINTS: usize = 8;
-/// All chosen slices together take at most this part of the cycles of the frame, unless that is very little or
-/// very much: then one slice is cut to the first or to the second number of cycles.
-const CYCLE_SHARE: u64 = 8;
-const LIMIT_CYCLES: [u64; 2] = [1 << 14, 1 << 20];
+/// Weight of a packet beside its lines, each of weight 1.
+const PACKET_WEIGHT: usize = 8;
+/// Weight of a part of the stream that is kept, and most parts that are.
+const PART_WEIGHT: usize = 1 << 16;
+const MAX_PARTS: usize = 8;
+/// Slices, and what part of the kept packets all of them have.
+const SLICES: usize = 4;
+const SLICED: usize = 16;
+/// Least weight of a slice.
+const MIN_SLICE_WEIGHT: usize = 1 << 11;
+/// Error of the slices from which on all kept packets are timed.
+const DOUBT: f64 = 0.02;
 /// Frames that take more cycles are not checked.
 const MAX_FRAME_CYCLES: u64 = crate::packet::MAX_CYCLES / 4;
+
+/// Size of an error from the logarithm of a ratio: 0.05 for 1.05 and for 1/1.05.
+pub fn error_size(log: f64) -> f64 {
+    libm::expm1(log.abs())
+}
 
 /// What a check of a frame found.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Checked {
-    /// Packets that both levels timed.
+    /// Packets that `stepped` timed, too.
     pub packets: usize,
     /// Packets of the frame.
     pub of: usize,
-    /// Estimated error of the cycles of the fast level, relative to `stepped`.
+    /// Estimated error of the cycles, relative to `stepped`.
     pub error: f64,
+    /// The fastest level among the more exact ones that is not far off.
+    pub better: Level,
 }
 
 impl Checked {
     /// The warning about a level that is far off.
     pub const CODE: Code = Code::TimingInaccurate;
-    /// Least error of a check that is worth it.
+    /// Least size of an error that is worth it.
     pub const FAR: f64 = 0.08;
+
+    /// Size of the error; see [`error_size`].
+    pub fn size(self) -> f64 {
+        error_size(libm::log1p(self.error))
+    }
 
     /// Whether the level is so far off that a run warns.
     pub fn is_far(self) -> bool {
-        self.error.abs() >= Self::FAR
+        self.size() >= Self::FAR
     }
 
     /// Warning about frame `frame` at a level that the user requested, or that was `chosen` with this relative
     /// error on a probe.
     pub fn warning(self, frame: u32, level: Level, chosen: Option<f64>) -> Warning {
-        let Self { packets, of, error } = self;
-        let name = level.name();
-        let better = if level == Level::Bound { Level::Packet } else { Level::Stepped }.name();
+        let Self { packets, of, error, better } = self;
+        let (name, better) = (level.name(), better.name());
         let remedy = match chosen {
             None => format!("use --timing {better}, or let --accuracy choose"),
             Some(error) => format!(
@@ -72,116 +84,174 @@ impl Checked {
     }
 }
 
-/// Core cycles of the first `most` packets of a slice.
-fn cycles(slice: &PacketBuffer, most: usize, level: Level, machine: Machine<'_>) -> Result<u64, TimingError> {
+/// The next more exact level, and most cycles that it may take for all kept packets.
+const fn judge(level: Level) -> Option<(Level, f64)> {
+    match level {
+        Level::Bound => Some((Level::Packet, (1u64 << 23) as f64)),
+        Level::Packet => Some((Level::Stepped, (1u64 << 20) as f64)),
+        Level::Stepped => None,
+    }
+}
+
+/// Core cycles of packets that follow each other.
+fn cycles<'a>(
+    packets: impl Iterator<Item = (&'a Packet, &'a [LineAccess])>,
+    level: Level,
+    machine: Machine<'_>,
+) -> Result<u64, TimingError> {
     // The recorder is not read.
     let mut clock = FrameClock::new(level, machine, Recorder::new(1 << 40, 2));
-    slice.iter().take(most).for_each(|(packet, lines)| clock.push(packet, lines));
+    packets.for_each(|(packet, lines)| clock.push(packet, lines));
     Ok(clock.finish()?.cycles)
 }
 
-/// Evenly spread slices of a stream of unknown length, each of packets that follow each other. Once there are too
+fn weight((_, lines): (&Packet, &[LineAccess])) -> usize {
+    PACKET_WEIGHT + lines.len()
+}
+
+/// Packets of one part that follow each other.
+#[derive(Clone, Copy, Debug)]
+struct Slice<'a> {
+    part: &'a PacketBuffer,
+    from: usize,
+    packets: usize,
+}
+
+impl<'a> Slice<'a> {
+    /// The packets of `part` of which some weight lies in `from..to`.
+    fn new(part: &'a PacketBuffer, [from, to]: [usize; 2]) -> Self {
+        let mut sum = 0;
+        let ends = part.iter().map(|packet| {
+            sum += weight(packet);
+            sum
+        });
+        let (mut first, mut packets) = (0, 0);
+        for end in ends {
+            first += usize::from(end <= from);
+            packets += usize::from(end > from);
+            if end >= to {
+                break;
+            }
+        }
+        Self { part, from: first, packets }
+    }
+
+    fn iter(self) -> impl Iterator<Item = (&'a Packet, &'a [LineAccess])> {
+        self.part.iter().skip(self.from).take(self.packets)
+    }
+}
+
+/// Evenly spread parts of a stream of unknown length, each of packets that follow each other. Once there are too
 /// many, every other one is dropped.
 #[derive(Clone, Debug)]
 pub struct Slices {
-    kept: Vec<PacketBuffer>,
-    /// Packets from the beginning of a slice to the next.
+    parts: Vec<PacketBuffer>,
+    /// One part of so many is kept.
     every: usize,
+    /// Parts so far, and the weight of the last.
+    begun: usize,
+    weight: usize,
     packets: usize,
 }
 
 impl Default for Slices {
     fn default() -> Self {
-        Self { kept: Vec::new(), every: SLICE_PACKETS, packets: 0 }
+        Self { parts: Vec::new(), every: 1, begun: 0, weight: PART_WEIGHT, packets: 0 }
     }
 }
 
 impl Slices {
     /// Add the next packet of the stream with its lines.
     pub fn push(&mut self, packet: &Packet, lines: &[LineAccess]) {
-        if self.packets == MAX_SLICES * self.every {
-            self.kept = self.kept.drain(..).step_by(2).collect();
-            self.every *= 2;
-        }
-        if self.packets.is_multiple_of(self.every) {
-            self.kept.push(PacketBuffer::default());
-        }
-        let is_open =
-            |slice: &&mut PacketBuffer| slice.len() < SLICE_PACKETS && slice.line_count() < SLICE_LINES;
-        if let Some(slice) = self.kept.last_mut().filter(is_open) {
-            slice.push(packet, lines);
+        if self.weight >= PART_WEIGHT {
+            self.begin();
         }
         self.packets += 1;
-    }
-
-    /// The error of `level`, by which the frame takes `of_frame` cycles. `None` without packets, for the
-    /// reference, and for frames that are too long for `packet`.
-    ///
-    /// # Errors
-    /// Those of [`FrameClock::finish`].
-    pub fn check(
-        &self,
-        level: Level,
-        machine: Machine<'_>,
-        of_frame: u64,
-    ) -> Result<Option<Checked>, TimingError> {
-        if level == Level::Stepped || of_frame > MAX_FRAME_CYCLES {
-            return Ok(None);
-        }
-        match self.estimate(level, machine, of_frame) {
-            Err(TimingError::TooLong) => Ok(None),
-            found => found,
+        self.weight += weight((packet, lines));
+        let is_kept = (self.begun - 1).is_multiple_of(self.every);
+        if let Some(part) = self.parts.last_mut().filter(|_| is_kept) {
+            part.push(packet, lines);
         }
     }
 
-    fn estimate(
+    /// Begin the next part.
+    fn begin(&mut self) {
+        if self.begun == MAX_PARTS * self.every {
+            self.parts = self.parts.drain(..).step_by(2).collect();
+            self.every *= 2;
+        }
+        if self.begun.is_multiple_of(self.every) {
+            self.parts.push(PacketBuffer::default());
+        }
+        (self.begun, self.weight) = (self.begun + 1, 0);
+    }
+
+    /// The error of `level`, by which the frame takes `of_frame` cycles. `None` for the reference, for
+    /// frames that are too long for `packet`, and if a level cannot time a slice.
+    pub fn check(&self, level: Level, machine: Machine<'_>, of_frame: u64) -> Option<Checked> {
+        let (better, most) = judge(level)?;
+        if of_frame > MAX_FRAME_CYCLES {
+            return None;
+        }
+        let compare = |runs: &[Vec<Slice<'_>>]| self.compare([level, better], machine, runs).ok();
+        let mut found = compare(&self.slices())?;
+        let kept: usize = self.parts.iter().map(PacketBuffer::len).sum();
+        let cycles = of_frame as f64 * kept as f64 / self.packets as f64;
+        if found.error.abs() >= DOUBT && cycles <= most {
+            found = compare(&self.all())?;
+        }
+        if judge(better).is_none() {
+            return Some(found);
+        }
+        let of_better = self.check(better, machine, of_frame)?;
+        Some(Checked {
+            error: (1.0 + found.error) * (1.0 + of_better.error) - 1.0,
+            better: if of_better.is_far() { of_better.better } else { better },
+            ..of_better
+        })
+    }
+
+    /// Compare two levels by packets that follow each other in each of `runs`.
+    fn compare(
         &self,
-        level: Level,
+        levels: [Level; 2],
         machine: Machine<'_>,
-        of_frame: u64,
-    ) -> Result<Option<Checked>, TimingError> {
-        let limit = (of_frame / (CYCLE_SHARE * POINTS as u64)).clamp(LIMIT_CYCLES[0], LIMIT_CYCLES[1]);
-        let (mut packets, mut fast, mut exact) = (0, 0.0, 0.0);
-        for (slice, points) in self.choose(machine)? {
-            let mut most = slice.len();
-            let mut timed = cycles(slice, most, level, machine)?;
-            if timed > limit {
-                most = (most as u64 * limit / timed).max(1) as usize;
-                timed = cycles(slice, most, level, machine)?;
+        runs: &[Vec<Slice<'_>>],
+    ) -> Result<Checked, TimingError> {
+        let mut sums = [0, 0];
+        for (sum, level) in sums.iter_mut().zip(levels) {
+            for run in runs {
+                *sum += cycles(run.iter().flat_map(|slice| slice.iter()), level, machine)?;
             }
-            let length = cycles(slice, most, Level::Packet, machine)?.max(1);
-            let weight = points as f64 / length as f64;
-            packets += most;
-            fast += weight * timed.max(1) as f64;
-            exact += weight * cycles(slice, most, Level::Stepped, machine)? as f64;
         }
-        Ok((exact > 0.0).then(|| Checked { packets, of: self.packets, error: fast / exact - 1.0 }))
+        let [fast, exact] = sums.map(|cycles| cycles.max(1) as f64);
+        let packets = runs.iter().flatten().map(|slice| slice.packets).sum();
+        Ok(Checked { packets, of: self.packets, error: fast / exact - 1.0, better: levels[1] })
     }
 
-    /// Slices that are chosen, and how often each is. The part of the frame that a slice stands for is as long
-    /// as its packets take at `packet`.
-    fn choose(&self, machine: Machine<'_>) -> Result<Vec<(&PacketBuffer, usize)>, TimingError> {
-        let mut lengths = Vec::with_capacity(self.kept.len());
-        for (slice, number) in self.kept.iter().zip(0..) {
-            let stands_for = self.every.min(self.packets - number * self.every) as f64 / slice.len() as f64;
-            let length = cycles(slice, slice.len(), Level::Packet, machine)?.max(1) as f64;
-            lengths.push(length * stands_for);
-        }
-        let chosen = self.kept.iter().zip(systematic(&lengths));
-        Ok(chosen.filter(|(_, points)| *points > 0).collect())
+    /// All that is kept. Parts follow each other if none was dropped.
+    fn all(&self) -> Vec<Vec<Slice<'_>>> {
+        let parts = self.parts.iter().map(|part| Slice { part, from: 0, packets: part.len() });
+        if self.every == 1 { vec![parts.collect()] } else { parts.map(|part| vec![part]).collect() }
     }
-}
 
-/// How many of [`POINTS`] points, evenly spread over all parts, lie in each.
-fn systematic(lengths: &[f64]) -> impl Iterator<Item = usize> {
-    let all: f64 = lengths.iter().sum();
-    let (mut sum, mut before) = (0.0, 0);
-    lengths.iter().map(move |length| {
-        sum += length;
-        // Points are at odd multiples of half a step.
-        let points = (sum / all * POINTS as f64 + 0.5) as usize;
-        points - std::mem::replace(&mut before, points)
-    })
+    /// Slices around points at even distances, none of them in two parts.
+    fn slices(&self) -> Vec<Vec<Slice<'_>>> {
+        let weights: Vec<usize> = self.parts.iter().map(|part| part.iter().map(weight).sum()).collect();
+        let all: usize = weights.iter().sum();
+        let half = (all / (SLICES * SLICED)).max(MIN_SLICE_WEIGHT) / 2;
+        let points = (0..SLICES).map(|slice| all * (2 * slice + 1) / (2 * SLICES)).filter(|_| all > 0);
+        let around = |point: usize| {
+            let (mut before, mut at) = (0, 0);
+            while before + weights[at] <= point {
+                before += weights[at];
+                at += 1;
+            }
+            let point = point - before;
+            vec![Slice::new(&self.parts[at], [point.saturating_sub(half), point + half])]
+        };
+        points.map(around).collect()
+    }
 }
 
 #[cfg(test)]
@@ -194,90 +264,121 @@ mod tests {
         crate::streams::rates()[0].packets[0].0
     }
 
-    /// A stream of packets, each with its number as the number of its triangle.
-    fn slices(packets: u32) -> Slices {
+    /// A stream of packets, each with its number as the number of its triangle, and with so many lines.
+    fn slices(packets: u32, lines: impl Fn(u32) -> usize) -> Slices {
         let (mut packet, mut slices) = (packet(), Slices::default());
         for triangle in 0..packets {
             packet.triangle = triangle;
-            slices.push(&packet, &[]);
+            let line = LineAccess::new(Unit::Texture, 0, LineKind::Fetch);
+            slices.push(&packet, &vec![line; lines(triangle)]);
         }
         slices
     }
 
+    /// First packets of slices, and how many there are.
+    fn of(runs: &[Vec<Slice<'_>>]) -> Vec<(u32, usize)> {
+        let of = |slice: &Slice<'_>| (slice.iter().next().unwrap().0.triangle, slice.iter().count());
+        runs.iter().flatten().map(of).collect()
+    }
+
+    /// Packets without lines of one part.
+    const PART: u32 = (PART_WEIGHT / PACKET_WEIGHT) as u32;
+
     #[test]
-    fn slices_are_evenly_spread_whatever_the_length_of_the_stream() {
-        let of = |packets| -> Vec<(u32, usize)> {
-            let first = |slice: &PacketBuffer| slice.iter().next().unwrap().0.triangle;
-            slices(packets).kept.iter().map(|slice| (first(slice), slice.len())).collect()
-        };
+    fn parts_are_evenly_spread_whatever_the_length_of_the_stream() {
+        let of = |packets| of(&slices(packets, |_| 0).all());
         assert!(of(0).is_empty());
         assert_eq!(of(100), [(0, 100)]);
-        assert_eq!(of(300), [(0, 256), (256, 44)]);
-        assert_eq!(of(32 * 256).len(), 32);
+        assert_eq!(of(PART + 44), [(0, PART as usize), (PART, 44)]);
         let every = |step: u32, count: u32| -> Vec<_> {
-            (0..count).map(|slice| (slice * step, SLICE_PACKETS)).collect()
+            (0..count).map(|part| (part * step * PART, PART as usize)).collect()
         };
-        assert_eq!(of(32 * 256 + 512), every(512, 17));
-        assert_eq!(of(100 * 1024), every(4096, 25));
+        assert_eq!(of(8 * PART), every(1, 8));
+        assert_eq!(of(9 * PART), every(2, 5));
+        assert_eq!(of(22 * PART), every(4, 6));
+        assert_eq!(slices(8 * PART, |_| 0).all().len(), 1);
+        assert_eq!(slices(9 * PART, |_| 0).all().len(), 5);
+    }
+
+    #[test]
+    fn slices_are_at_even_distances_of_weight() {
+        let of = |packets, lines: fn(u32) -> usize| of(&slices(packets, lines).slices());
+        // An eighth on either side of the first and the last.
+        assert_eq!(of(4 * PART, |_| 0), [3840, 12_032, 20_224, 28_416].map(|first| (first, 512)));
+        // The least weight; and fewer packets than that.
+        assert_eq!(of(6400, |_| 0), [672, 2272, 3872, 5472].map(|first| (first, 256)));
+        assert_eq!(of(2, |_| 0), [(0, 2); 4]);
+        // The last packets have nearly all lines.
+        let late = |packet| if packet < 1000 { 0 } else { 10_000 };
+        let first: Vec<_> = of(1010, late).into_iter().map(|(first, _)| first).collect();
+        assert_eq!(first, [1000, 1003, 1005, 1008]);
     }
 
     fn machine(units: &crate::MachineSpec) -> Machine<'_> {
         Machine { units, clocks: crate::Clocks::new(1e9, 1e9).unwrap() }
     }
 
-    #[test]
-    fn the_check_of_a_frame_of_one_slice_is_its_error() {
+    fn reference() -> crate::MachineSpec {
         let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../run/gpus/reference.ron");
         #[derive(serde::Deserialize)]
         struct Gpu {
             units: crate::MachineSpec,
         }
-        let Gpu { units } = activity::spec::load(path.as_ref()).unwrap();
-        let case = crate::streams::failures(&units, 512).into_iter().find(|case| case.packets.len() < 256);
-        let mut slices = Slices::default();
-        let mut all = PacketBuffer::default();
-        for (packet, lines) in &case.unwrap().packets {
+        activity::spec::load::<Gpu>(path.as_ref()).unwrap().units
+    }
+
+    /// The slices and all packets of a stream that breaks levels.
+    fn broken(units: &crate::MachineSpec, name: &str) -> (Slices, PacketBuffer) {
+        let case = crate::streams::failures(units, 512).into_iter().find(|case| case.name == name).unwrap();
+        let (mut slices, mut all) = (Slices::default(), PacketBuffer::default());
+        for (packet, lines) in &case.packets {
             slices.push(packet, lines);
             all.push(packet, lines);
         }
-        let [exact, fast] = [Level::Stepped, Level::Bound]
-            .map(|level| cycles(&all, all.len(), level, machine(&units)).unwrap() as f64);
-        let found = slices.check(Level::Bound, machine(&units), fast as u64).unwrap().unwrap();
-        assert_eq!((found.packets, found.of), (all.len(), all.len()));
-        assert!((found.error - (fast / exact - 1.0)).abs() < 1e-12 && exact != fast, "{found:?}");
-        assert_eq!(slices.check(Level::Stepped, machine(&units), 0).unwrap(), None);
-        assert_eq!(Slices::default().check(Level::Bound, machine(&units), 0).unwrap(), None);
+        (slices, all)
     }
 
     #[test]
-    fn parts_are_chosen_as_often_as_they_are_long() {
-        let of = |lengths: &[f64]| systematic(lengths).collect::<Vec<_>>();
-        assert_eq!(of(&[7.0]), [8]);
-        assert_eq!(of(&[1.0; 8]), [1; 8]);
-        assert_eq!(of(&[1.0; 24]), [0, 1, 0].repeat(8));
-        assert_eq!(of(&[1.0, 98.0, 1.0]), [0, 8, 0]);
-        assert!(of(&[]).is_empty());
+    fn a_level_that_differs_is_checked_by_all_packets() {
+        let units = reference();
+        let (slices, all) = broken(&units, "one giant triangle");
+        let [packet, bound] = [Level::Packet, Level::Bound]
+            .map(|level| cycles(all.iter(), level, machine(&units)).unwrap() as f64);
+        let check = |level, cycles| slices.check(level, machine(&units), cycles).unwrap();
+        let of_packet = check(Level::Packet, packet as u64);
+        assert!(of_packet.packets < all.len() && of_packet.error.abs() < DOUBT, "{of_packet:?}");
+        let found = check(Level::Bound, bound as u64);
+        let error = bound / packet * (1.0 + of_packet.error) - 1.0;
+        assert!((found.error - error).abs() < 1e-12 && error.abs() > DOUBT, "{found:?}");
+        assert_eq!((found.packets, found.of, found.better), (of_packet.packets, all.len(), Level::Packet));
+        // Too long for that.
+        let sliced = check(Level::Bound, 1 << 24);
+        assert!((sliced.error - error).abs() > 1e-3, "{sliced:?}");
     }
 
     #[test]
-    fn a_slice_ends_with_its_lines() {
-        let mut slices = Slices::default();
-        let lines = vec![LineAccess::new(Unit::Texture, 0, LineKind::Fetch); SLICE_LINES / 2];
-        (0..9).for_each(|_| slices.push(&packet(), &lines));
-        assert_eq!((slices.kept[0].len(), slices.kept[0].line_count()), (2, SLICE_LINES));
+    fn the_reference_is_not_checked_and_frames_without_packets_are_exact() {
+        let units = reference();
+        assert_eq!(slices(9, |_| 1).check(Level::Stepped, machine(&units), 100), None);
+        let empty = Slices::default().check(Level::Bound, machine(&units), 0).unwrap();
+        assert_eq!((empty.of, empty.error), (0, 0.0));
+        let exact = slices(9, |_| 1).check(Level::Packet, machine(&units), 100).unwrap();
+        assert!(exact.of == 9 && exact.error.abs() < DOUBT, "{exact:?}");
     }
 
     #[test]
     fn a_warning_says_how_far_off_and_what_to_do() {
-        let checked = Checked { packets: 512, of: 9000, error: -0.125 };
+        let checked = Checked { packets: 512, of: 9000, error: -0.125, better: Level::Packet };
         assert!(checked.is_far() && !Checked { error: 0.079, ..checked }.is_far());
-        let message = |level, chosen| checked.warning(3, level, chosen).message;
+        // The larger number is 8.1 % larger.
+        assert!(Checked { error: -0.075, ..checked }.is_far());
+        let message = |checked: Checked, level, chosen| checked.warning(3, level, chosen).message;
         assert_eq!(
-            message(Level::Bound, None),
+            message(checked, Level::Bound, None),
             "`bound` is about 12.5 % too short, by 512 of 9000 packets of frame 3 that `stepped` timed, too: times and energies \
              may be as far off; use --timing packet, or let --accuracy choose"
         );
-        let chosen = message(Level::Packet, Some(0.012));
+        let chosen = message(Checked { better: Level::Stepped, ..checked }, Level::Packet, Some(0.012));
         let remedy = "`packet` was chosen with an error of 1.20 % on a probe; give a smaller --accuracy, or --timing stepped";
         assert!(chosen.ends_with(remedy), "{chosen}");
     }

@@ -7,14 +7,12 @@ use std::collections::BTreeMap;
 use activity::{Counts, Event};
 use output::table::si;
 use power_model::{PacedFrame, PacedRun};
-use timing::Checked;
 use traces::frames::Flag;
 use warnings::{Code, Warning};
 
 use self::regimes::of_regimes;
 use crate::heat::HeatPicture;
 use crate::measure::MIN_BUSY_SAMPLES;
-use crate::simulated::error_size;
 use crate::{Choice, Measurement, Observed, Plan, RunFrame, Simulated, Verified};
 
 /// All warnings of a run, sorted, without duplicates.
@@ -90,9 +88,8 @@ fn of_frames<'a>(frames: impl ExactSizeIterator<Item = (u32, &'a [Warning])>) ->
 /// Warning about the frame that the check of the timing level found farthest off.
 fn accuracy(plan: &Plan, simulated: &Simulated) -> Option<Warning> {
     let checked = simulated.observed().filter_map(|(frame, observed)| Some((frame.index, observed.checked?)));
-    let size = |checked: &Checked| error_size(libm::log1p(checked.error));
     let (frame, worst) =
-        checked.filter(|(_, of)| of.is_far()).max_by(|(_, a), (_, b)| size(a).total_cmp(&size(b)))?;
+        checked.filter(|(_, of)| of.is_far()).max_by(|(_, a), (_, b)| a.size().total_cmp(&b.size()))?;
     Some(worst.warning(frame, plan.options.level(), plan.chosen))
 }
 

@@ -1,8 +1,8 @@
 //! What the errors of many runs say: accuracy of levels, stated errors, and designs whose order turns.
 
-use run::{CONFIDENCE, StatedError, error_size};
+use run::{CONFIDENCE, StatedError};
 use serde::Serialize;
-use timing::{Checked, Level};
+use timing::{Checked, Level, error_size};
 
 use super::{ErrorRow, LEVELS, StatedErrorsChart};
 use crate::chart::quantiles;
@@ -98,7 +98,7 @@ impl StatedMargin {
         let rows: Vec<&ErrorRow> = rows.iter().filter(|row| row.level == level).collect();
         let all = |log: Log| rows.iter().map(move |row| beyond_check(row, log));
         let (cycles, energy): (Log, Log) = (|row| row.cycles_log, |row| row.energy_log);
-        let stated = StatedError::of(level, 0.0);
+        let stated = StatedError::of(level, Some(0.0));
         Self {
             level,
             runs: rows.len(),
@@ -171,7 +171,7 @@ fn flips_by(rows: &[ErrorRow], level: Level, by: &'static str) -> Flips {
     let of_level: Vec<&ErrorRow> = rows.iter().filter(|row| row.level == level).collect();
     // Logarithm of the truth, of what was found, and of the stated error.
     let logs = |row: &ErrorRow| {
-        let stated = StatedError::of(level, libm::expm1(row.checked_log));
+        let stated = StatedError::of(level, Some(libm::expm1(row.checked_log)));
         let [truth, error, stated] = match by {
             "time" => [row.stepped_s, row.cycles_log, stated.cycles],
             _ => [row.stepped_j, row.energy_log, stated.energy],

@@ -224,7 +224,7 @@ impl StatedErrorsChart {
             rows.map(|row| (of(row), 100.0 * row.cycles_log.abs(), String::new())).collect()
         };
         let ends = rows().map(of).fold([f64::INFINITY, 0.0], |[low, high], x| [low.min(x), high.max(x)]);
-        let stated = 100.0 * libm::log1p(StatedError::of(level, 0.0).cycles);
+        let stated = 100.0 * libm::log1p(StatedError::of(level, Some(0.0)).cycles);
         let line = ends.map(|x| (x, stated)).to_vec();
         let series = vec![
             Series::new("without a warning", PlotMark::Dots(points(false))).painted(Paint::Like(0)),

@@ -169,7 +169,7 @@ impl Written {
 
     /// The check of a level by which the frame takes so many cycles.
     pub fn check(&self, level: Level, gpu: &GpuSpec, cycles: u64) -> Result<Option<Checked>, RunError> {
-        Ok(self.slices.check(level, gpu.machine()?, cycles)?)
+        Ok(self.slices.check(level, gpu.machine()?, cycles))
     }
 }
 
