@@ -5,7 +5,7 @@ use output::table::{counted, digits, grouped, si};
 use pipeline::Gpu;
 use power_model::UncertainValue;
 use serde::Serialize;
-use timing::{FrameClock, Level, Recorder};
+use timing::{CheckedClock, Level, Recorder};
 use warnings::Warning;
 use workloads::Scene;
 use workloads::job::Reduction;
@@ -304,7 +304,7 @@ impl Probe<'_> {
         let ready = job.prepare(number)?;
         let made_s = started.elapsed().as_secs_f64();
         let recorder = Recorder::new(crate::BIN_PS, frame::MIN_FRAME_BINS);
-        let mut clock = FrameClock::new(level, plan.gpu.machine()?, recorder);
+        let mut clock = CheckedClock::new(level, plan.gpu.machine()?, recorder);
         let emit = |packet: &_, lines: &_| clock.push(packet, lines);
         let mut gpu = Gpu::new(&plan.gpu.pipeline, emit)?;
         ready.draw(&mut gpu).map_err(RunError::on(&plan.gpu))?;

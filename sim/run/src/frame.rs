@@ -15,7 +15,7 @@ use pipeline::frame::HeatMap;
 use pipeline::{FrameReport, Gpu, Viewport};
 use power_model::{FramePower, PowerModel};
 use rayon::prelude::*;
-use timing::{FrameClock, Level, Recorder, Slices, Timed, TimingError};
+use timing::{CheckedClock, FrameClock, Level, Recorder, Timed, TimingError};
 use warnings::Warning;
 use workloads::job::{Drawn, Fact, ReadyFrame};
 use workloads::{Fingerprint, Job, Regime};
@@ -186,11 +186,10 @@ impl DrawnFrame {
 
 fn simulate_frame(plan: &Plan, number: u32, max_bins: usize) -> Result<(RunFrame, Pictures), RunError> {
     let level = plan.options.timing.ok_or_else(not_timed)?;
-    let mut clock = FrameClock::new(level, plan.gpu.machine()?, Recorder::new(BIN_PS, max_bins));
-    let (stop, mut slices) = (Cell::new(false), Slices::default());
+    let mut clock = CheckedClock::new(level, plan.gpu.machine()?, Recorder::new(BIN_PS, max_bins));
+    let stop = Cell::new(false);
     let emit = |packet: &_, lines: &_| {
         clock.push(packet, lines);
-        slices.push(packet, lines);
         stop.set(clock.is_too_long());
     };
     let drawn = draw(plan, number, Some(&stop), emit);
@@ -198,7 +197,7 @@ fn simulate_frame(plan: &Plan, number: u32, max_bins: usize) -> Result<(RunFrame
         return Err(TimingError::TooLong.into());
     }
     let (frame, pictures) = drawn?;
-    Ok((frame.powered(&clock.finish_checked(&slices)?, &plan.model)?, pictures))
+    Ok((frame.powered(&clock.finish()?, &plan.model)?, pictures))
 }
 
 /// Error of simulating a run without a timing level.

@@ -9,7 +9,7 @@
 use activity::{LineAccess, Packet, PacketBuffer};
 use warnings::{Code, Warning};
 
-use crate::{FrameClock, Level, Machine, Recorder, TimingError};
+use crate::{FrameClock, Level, Machine, Recorder, Timed, TimingError};
 
 /// Weight of a packet beside its lines, each of weight 1.
 const PACKET_WEIGHT: usize = 8;
@@ -81,6 +81,45 @@ impl Checked {
                 1e2 * error.abs()
             ),
         )
+    }
+}
+
+/// A clock of a frame that checks its level.
+pub struct CheckedClock<'a> {
+    clock: FrameClock<'a>,
+    /// `None` at the reference.
+    slices: Option<Slices>,
+}
+
+impl<'a> CheckedClock<'a> {
+    /// A clock at time 0.
+    pub fn new(level: Level, machine: Machine<'a>, recorder: Recorder) -> Self {
+        let slices = (level != Level::Stepped).then(Slices::default);
+        Self { clock: FrameClock::new(level, machine, recorder), slices }
+    }
+
+    /// Add the next packet of the stream and the lines it requests from the L2.
+    pub fn push(&mut self, packet: &Packet, lines: &[LineAccess]) {
+        self.clock.push(packet, lines);
+        if let Some(slices) = &mut self.slices {
+            slices.push(packet, lines);
+        }
+    }
+
+    /// See [`FrameClock::is_too_long`].
+    pub fn is_too_long(&self) -> bool {
+        self.clock.is_too_long()
+    }
+
+    /// Timing of the frame, with [`Timed::checked`].
+    ///
+    /// # Errors
+    /// See [`FrameClock::finish`].
+    pub fn finish(self) -> Result<Timed, TimingError> {
+        match self.slices {
+            Some(slices) => self.clock.finish_checked(&slices),
+            None => self.clock.finish(),
+        }
     }
 }
 

@@ -4,8 +4,8 @@
 //! - [`MachineSpec`]: throughput, latency, queues and clocks of the units of the block diagram.
 //! - [`DemandBuilder`] and [`ServiceDemand`]: cycles that a packet needs at each station, the same for all
 //!   levels.
-//! - [`Level`] and [`FrameClock`]: the levels, and a clock for any of them; [`Slices`] and [`Checked`]: how far a
-//!   level is off, by parts of a frame.
+//! - [`Level`] and [`FrameClock`]: the levels, and a clock for any of them; [`CheckedClock`] and [`Checked`]: how far
+//!   a level is off, by [`Slices`] of the frame.
 //! - [`stepped`]: the reference, cycle by cycle.
 //! - [`PacketClock`]: a recurrence over packets, with calendars for shared resources.
 //! - [`BoundClock`]: a roofline over segments of the stream, from [`Totals`] gathered while packets arrive.
@@ -49,7 +49,7 @@ use packet::MAX_CYCLES;
 use stepped::{Stalled, StepOptions, Stream};
 
 pub use bound::{BoundClock, Totals, bound};
-pub use check::{Checked, Slices, error_size};
+pub use check::{Checked, CheckedClock, Slices, error_size};
 pub use clock::{Clocks, Time};
 pub use demand::{CLIENTS, CYCLE, DemandBuilder, ServiceDemand, Station, Work};
 pub use draws::{DrawSpan, PassTime};

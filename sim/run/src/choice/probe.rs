@@ -6,7 +6,7 @@ use activity::{Counts, Event, PacketBuffer};
 use cpu_time::ThreadTime;
 use output::terminal::Progress;
 use pipeline::PipelineSpec;
-use timing::{FrameClock, Level, Recorder};
+use timing::{CheckedClock, Level, Recorder};
 use workloads::Job;
 use workloads::job::Reduction;
 
@@ -106,8 +106,8 @@ impl ProbedFrame {
     fn timed(&self, plan: &Plan, level: Level) -> Result<(FrameCost, f64), RunError> {
         let started = ThreadTime::now();
         let recorder = Recorder::new(crate::BIN_PS, frame::MIN_FRAME_BINS);
-        let mut clock = FrameClock::new(level, plan.gpu.machine()?, recorder);
-        clock.push_all(&self.packets);
+        let mut clock = CheckedClock::new(level, plan.gpu.machine()?, recorder);
+        self.packets.iter().for_each(|(packet, lines)| clock.push(packet, lines));
         let timed = clock.finish()?;
         let timing_s = started.elapsed().as_secs_f64();
         let power = plan.model.frame(&timed.timeline);

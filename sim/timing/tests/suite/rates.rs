@@ -2,7 +2,7 @@
 
 use activity::{Event, LineAccess, LineKind, Packet, PacketKind, Unit};
 use timing::streams::{Packets, failures, rates};
-use timing::{Checked, Clocks, FrameClock, Level, Machine, MachineSpec, Recorder, Slices, Timed};
+use timing::{Checked, CheckedClock, Clocks, Level, Machine, MachineSpec, Recorder, Timed};
 
 use crate::common::size;
 
@@ -27,13 +27,9 @@ impl Gpu {
         let clocks = Clocks::new(self.core_hz, self.memory_hz).unwrap();
         Level::ALL.map(|level| {
             let recorder = Recorder::new(1_000_000, 1 << 16);
-            let mut clock = FrameClock::new(level, Machine { units, clocks }, recorder);
-            let mut slices = Slices::default();
-            for (packet, lines) in packets {
-                clock.push(packet, lines);
-                slices.push(packet, lines);
-            }
-            clock.finish_checked(&slices).unwrap()
+            let mut clock = CheckedClock::new(level, Machine { units, clocks }, recorder);
+            packets.iter().for_each(|(packet, lines)| clock.push(packet, lines));
+            clock.finish().unwrap()
         })
     }
 }

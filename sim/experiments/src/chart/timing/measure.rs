@@ -10,7 +10,7 @@ use run::{GpuSpec, RunError, cheapest_level};
 use serde::Serialize;
 use timing::stepped::{self, StepOptions, Stream};
 use timing::{
-    Checked, Clocks, DemandBuilder, FrameClock, Level, PacketClock, Recorder, Slices, Timed, TimingError,
+    Checked, CheckedClock, Clocks, DemandBuilder, Level, PacketClock, Recorder, Slices, Timed, TimingError,
     Totals, bound, streams,
 };
 
@@ -263,13 +263,9 @@ pub(super) fn added(subject: &Subject, gpu: &GpuSpec) -> Result<Vec<AddedRow>, R
     let drawn_s = fastest(|| subject.render(gpu, |_, _| {}))?;
     let row = |level| {
         let timed_s = fastest(|| {
-            let mut clock = FrameClock::new(level, gpu.machine()?, Recorder::new(BIN_PS, MAX_BINS));
-            let mut slices = Slices::default();
-            subject.render(gpu, |packet, lines| {
-                clock.push(packet, lines);
-                slices.push(packet, lines);
-            })?;
-            clock.finish_checked(&slices)?;
+            let mut clock = CheckedClock::new(level, gpu.machine()?, Recorder::new(BIN_PS, MAX_BINS));
+            subject.render(gpu, |packet, lines| clock.push(packet, lines))?;
+            clock.finish()?;
             Ok(())
         })?;
         let added_percent = (timed_s / drawn_s - 1.0) * 100.0;
