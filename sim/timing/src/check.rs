@@ -16,11 +16,9 @@ const PACKET_WEIGHT: usize = 8;
 /// Weight of a part of the stream that is kept, and most parts that are.
 const PART_WEIGHT: usize = 1 << 16;
 const MAX_PARTS: usize = 8;
-/// Slices, and what part of the kept packets all of them have.
+/// Slices, and the weight of each.
 const SLICES: usize = 4;
-const SLICED: usize = 16;
-/// Least weight of a slice.
-const MIN_SLICE_WEIGHT: usize = 1 << 11;
+const SLICE_WEIGHT: usize = 1 << 11;
 /// Error of the slices from which on all kept packets are timed.
 const DOUBT: f64 = 0.02;
 /// Frames that take more cycles are not checked.
@@ -175,6 +173,14 @@ impl<'a> Slice<'a> {
         Self { part, from: first, packets }
     }
 
+    /// What of it comes after another slice; a heavy packet may be in both.
+    fn after(self, other: Option<Self>) -> Option<Self> {
+        let other = other.filter(|other| std::ptr::eq(other.part, self.part));
+        let from = other.map_or(0, |other| other.from + other.packets).max(self.from);
+        let packets = (self.from + self.packets).saturating_sub(from);
+        (packets > 0).then_some(Self { from, packets, ..self })
+    }
+
     fn iter(self) -> impl Iterator<Item = (&'a Packet, &'a [LineAccess])> {
         self.part.iter().skip(self.from).take(self.packets)
     }
@@ -236,7 +242,7 @@ impl Slices {
         let mut found = compare(&self.slices())?;
         let kept: usize = self.parts.iter().map(PacketBuffer::len).sum();
         let cycles = of_frame as f64 * kept as f64 / self.packets as f64;
-        if found.error.abs() >= DOUBT && cycles <= most {
+        if found.packets < kept && found.error.abs() >= DOUBT && cycles <= most {
             found = compare(&self.all())?;
         }
         if judge(better).is_none() {
@@ -274,22 +280,25 @@ impl Slices {
         if self.every == 1 { vec![parts.collect()] } else { parts.map(|part| vec![part]).collect() }
     }
 
-    /// Slices around points at even distances, none of them in two parts.
+    /// Slices around points at even distances, none of them in two parts; all that is kept if it is little more.
     fn slices(&self) -> Vec<Vec<Slice<'_>>> {
         let weights: Vec<usize> = self.parts.iter().map(|part| part.iter().map(weight).sum()).collect();
         let all: usize = weights.iter().sum();
-        let half = (all / (SLICES * SLICED)).max(MIN_SLICE_WEIGHT) / 2;
-        let points = (0..SLICES).map(|slice| all * (2 * slice + 1) / (2 * SLICES)).filter(|_| all > 0);
-        let around = |point: usize| {
-            let (mut before, mut at) = (0, 0);
-            while before + weights[at] <= point {
-                before += weights[at];
+        if all <= SLICES * SLICE_WEIGHT {
+            return self.all();
+        }
+        let mut slices: Vec<Vec<Slice<'_>>> = Vec::new();
+        for point in (0..SLICES).map(|slice| all * (2 * slice + 1) / (2 * SLICES)) {
+            let (mut at, mut point) = (0, point);
+            while weights[at] <= point {
+                point -= weights[at];
                 at += 1;
             }
-            let point = point - before;
-            vec![Slice::new(&self.parts[at], [point.saturating_sub(half), point + half])]
-        };
-        points.map(around).collect()
+            let [from, to] = [point.saturating_sub(SLICE_WEIGHT / 2), point + SLICE_WEIGHT / 2];
+            let slice = Slice::new(&self.parts[at], [from, to]).after(slices.last().map(|last| last[0]));
+            slices.extend(slice.map(|slice| vec![slice]));
+        }
+        slices
     }
 }
 
@@ -343,10 +352,11 @@ mod tests {
     fn slices_are_at_even_distances_of_weight() {
         let of = |packets, lines: fn(u32) -> usize| of(&slices(packets, lines).slices());
         // An eighth on either side of the first and the last.
-        assert_eq!(of(4 * PART, |_| 0), [3840, 12_032, 20_224, 28_416].map(|first| (first, 512)));
-        // The least weight; and fewer packets than that.
         assert_eq!(of(6400, |_| 0), [672, 2272, 3872, 5472].map(|first| (first, 256)));
-        assert_eq!(of(2, |_| 0), [(0, 2); 4]);
+        // Little more than four slices.
+        assert_eq!(of(1024, |_| 0), [(0, 1024)]);
+        // A packet with nearly all lines is in one slice.
+        assert_eq!(of(400, |packet| if packet == 200 { 90_000 } else { 0 }), [(200, 1)]);
         // The last packets have nearly all lines.
         let late = |packet| if packet < 1000 { 0 } else { 10_000 };
         let first: Vec<_> = of(1010, late).into_iter().map(|(first, _)| first).collect();
