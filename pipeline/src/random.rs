@@ -18,6 +18,12 @@ pub const fn unit(word: u64) -> f64 {
     (word >> 11) as f64 / (1_u64 << 53) as f64
 }
 
+/// A number in [0, 1) in single precision, a multiple of 2^-24, from the upper bits of a word.
+#[inline]
+pub const fn unit_single(word: u64) -> f32 {
+    (word >> 40) as f32 / 16_777_216.0
+}
+
 /// Sequence of SplitMix64 from a seed.
 #[derive(Clone, Copy, Debug)]
 pub struct SplitMix(u64);
@@ -37,6 +43,16 @@ impl SplitMix {
     /// The next number in [0, 1).
     pub const fn next_unit(&mut self) -> f64 {
         unit(self.next_word())
+    }
+
+    /// The next number between `low` and `high`.
+    pub fn within(&mut self, low: f64, high: f64) -> f64 {
+        low + (high - low) * self.next_unit()
+    }
+
+    /// The next number between `low` and `high` in single precision.
+    pub fn within_single(&mut self, low: f32, high: f32) -> f32 {
+        low + (high - low) * unit_single(self.next_word())
     }
 }
 
@@ -62,5 +78,6 @@ mod tests {
     fn units_run_from_zero_to_below_one() {
         assert_eq!([0, 1 << 63, 1 << 11].map(unit), [0.0, 0.5, f64::EPSILON / 2.0]);
         assert_eq!(unit(u64::MAX), 1.0 - f64::EPSILON / 2.0);
+        assert_eq!([0, 1 << 63, u64::MAX].map(unit_single), [0.0, 0.5, 1.0 - f32::EPSILON / 2.0]);
     }
 }

@@ -23,17 +23,8 @@ struct Scene {
     triangles: Vec<[u32; 3]>,
 }
 
-/// Uniform random numbers.
-struct Uniform(SplitMix);
-
-impl Uniform {
-    fn within(&mut self, lo: f32, hi: f32) -> f32 {
-        lo + (hi - lo) * ((self.0.next_word() >> 40) as f32 / 16_777_216.0)
-    }
-
-    fn offset(&mut self, size: f32) -> Vec3 {
-        Vec3::new(self.within(-size, size), self.within(-size, size), self.within(-size, size))
-    }
+fn offset(r: &mut SplitMix, size: f32) -> Vec3 {
+    Vec3::from_array([0; 3].map(|_| r.within_single(-size, size)))
 }
 
 /// Parameters of random triangles. Sizes and speeds are shares of the depth; `speed` is the largest of a
@@ -59,17 +50,17 @@ const SOUPS: [Soup; 7] = [
 impl Soup {
     fn scene(&self) -> Scene {
         let seed = u64::from(self.count) ^ u64::from(self.size.to_bits());
-        let mut r = Uniform(SplitMix::new(seed.wrapping_mul(GOLDEN)));
+        let mut r = SplitMix::new(seed.wrapping_mul(GOLDEN));
         let (mut open, mut close) = (Vec::new(), Vec::new());
         for _ in 0..self.count {
-            let z = r.within(3.0, 30.0);
-            let middle = Vec3::new(r.within(-0.6, 0.6) * z, r.within(-0.6, 0.6) * z, z);
-            let speed = self.speed * z * 200.0_f32.powf(-r.within(0.0, 1.0));
-            let drift = r.offset(1.0).normalize_or_zero() * speed;
+            let z = r.within_single(3.0, 30.0);
+            let middle = Vec3::new(r.within_single(-0.6, 0.6) * z, r.within_single(-0.6, 0.6) * z, z);
+            let speed = self.speed * z * 200.0_f32.powf(-r.within_single(0.0, 1.0));
+            let drift = offset(&mut r, 1.0).normalize_or_zero() * speed;
             for _ in 0..3 {
-                let corner = middle + r.offset(self.size * z);
+                let corner = middle + offset(&mut r, self.size * z);
                 open.push(corner);
-                close.push(corner + drift + r.offset(0.2 * speed));
+                close.push(corner + drift + offset(&mut r, 0.2 * speed));
             }
         }
         let camera = Camera::new(Affine3A::IDENTITY, 0.577, 0.1).unwrap();

@@ -322,13 +322,8 @@ mod tests {
 
     use super::*;
 
-    /// Uniform numbers.
-    struct Uniform(SplitMix);
-
-    impl Uniform {
-        fn point(&mut self, scale: f64) -> DVec3 {
-            DVec3::from_array([0; 3].map(|_| (self.0.next_unit() - 0.5) * scale))
-        }
+    fn point(r: &mut SplitMix, scale: f64) -> DVec3 {
+        DVec3::from_array([0; 3].map(|_| (r.next_unit() - 0.5) * scale))
     }
 
     type Moving = [[DVec3; 3]; 2];
@@ -343,12 +338,12 @@ mod tests {
 
     /// Moving triangles of single-precision coordinates, some of them twice, some on a grid and in the plane y = 0.
     fn strewn(count: usize, seed: u64) -> Vec<Moving> {
-        let mut r = Uniform(SplitMix::new(seed));
+        let mut r = SplitMix::new(seed);
         let mut faces: Vec<Moving> = Vec::new();
         for index in 0..count {
-            let place = r.point(4.0);
-            let open = [0; 3].map(|_| place + r.point(0.8));
-            let drift = r.point(if index % 2 == 0 { 1.0 } else { 0.0 });
+            let place = point(&mut r, 4.0);
+            let open = [0; 3].map(|_| place + point(&mut r, 0.8));
+            let drift = point(&mut r, if index % 2 == 0 { 1.0 } else { 0.0 });
             let close = open.map(|corner| corner + drift);
             let single = |end: [DVec3; 3]| end.map(|corner| corner.as_vec3().as_dvec3());
             let flat = |end: [DVec3; 3]| {
@@ -364,10 +359,10 @@ mod tests {
     }
 
     fn rays(count: usize, seed: u64) -> impl Iterator<Item = Ray> {
-        let mut r = Uniform(SplitMix::new(seed));
+        let mut r = SplitMix::new(seed);
         (0..count).map(move |index| {
-            let t = (r.point(1.0).x + 0.5) as f32;
-            let (mut from, mut along) = (r.point(6.0), r.point(2.0));
+            let t = (point(&mut r, 1.0).x + 0.5) as f32;
+            let (mut from, mut along) = (point(&mut r, 6.0), point(&mut r, 2.0));
             match index % 4 {
                 // Along an axis, from a point of the grid: through edges and vertices of the triangles there.
                 0 => {

@@ -17,7 +17,7 @@ use std::sync::Arc;
 use glam::{Affine3A, Vec3, Vec4};
 use pipeline::depth::{BoxGrid, Pyramid};
 use pipeline::geometry::Projection;
-use pipeline::random::mix;
+use pipeline::random::{mix, unit_single};
 use pipeline::sampling::SampleSource;
 use pipeline::{
     Camera, Cull, Draw, DrawError, Geometry, Gpu, IntervalAnswer, IntervalQueries, Lane, Lens, MovingBox,
@@ -392,7 +392,7 @@ impl WallSceneSpec {
 
     fn uniform(&self, of: u64, n: u32, low: f32, high: f32) -> f32 {
         let word = mix(mix(self.seed ^ of << 32) ^ u64::from(n));
-        low + (high - low) * ((word >> 40) as f32 / 16_777_216.0)
+        low + (high - low) * unit_single(word)
     }
 
     /// Centre of a wall, and half of its motion.

@@ -174,7 +174,7 @@ mod testing {
         }
 
         pub fn within(&mut self, lo: f32, hi: f32) -> f32 {
-            lo + (hi - lo) * ((self.0.next_word() >> 40) as f32 / 16_777_216.0)
+            self.0.within_single(lo, hi)
         }
 
         /// A number of a range, often an end of it.

@@ -7,29 +7,13 @@ use crate::common::touch;
 use pipeline::conservative::{Grid, MovingTriangle, Rasterizer, Rect, Region, Touch, View};
 use pipeline::random::SplitMix;
 
-struct Numbers(SplitMix);
-
-impl Numbers {
-    fn new(seed: u64) -> Self {
-        Self(SplitMix::new(seed))
-    }
-
-    fn bits(&mut self) -> u64 {
-        self.0.next_word()
-    }
-
-    fn within(&mut self, lo: f64, hi: f64) -> f64 {
-        lo + (hi - lo) * self.0.next_unit()
-    }
-
-    /// Uniform, on a coarse binary grid, or an end.
-    fn odd(&mut self, lo: f64, hi: f64) -> f64 {
-        match self.bits() % 4 {
-            0 => lo,
-            1 => hi,
-            2 => lo + (hi - lo) * (self.bits() % 9) as f64 / 8.0,
-            _ => self.within(lo, hi),
-        }
+/// Uniform, on a coarse binary grid, or an end.
+fn odd(r: &mut SplitMix, [lo, hi]: [f64; 2]) -> f64 {
+    match r.next_word() % 4 {
+        0 => lo,
+        1 => hi,
+        2 => lo + (hi - lo) * (r.next_word() % 9) as f64 / 8.0,
+        _ => r.within(lo, hi),
     }
 }
 
@@ -69,25 +53,25 @@ const VIEWS: [View; 6] = [
 
 const GRID: Grid = Grid { origin: [-8.0, -8.0], tile: [1.0; 2], columns: 16, rows: 16 };
 
-fn triangle(kind: TriangleKind, view: &View, r: &mut Numbers) -> [[[f64; 3]; 3]; 2] {
+fn triangle(kind: TriangleKind, view: &View, r: &mut SplitMix) -> [[[f64; 3]; 3]; 2] {
     let middle = [r.within(-6.0, 6.0), r.within(-6.0, 6.0), r.within(1.0, 8.0)];
     let radius = match kind {
         TriangleKind::Tiny => 1e-6,
         TriangleKind::Huge => 1e6,
         _ => r.within(0.2, 4.0),
     };
-    let still = r.bits().is_multiple_of(4);
+    let still = r.next_word().is_multiple_of(4);
     let mut end = |drift: f64| {
         let mut p = [0, 1, 2].map(|_| {
             let mut p = middle.map(|c| c + drift * r.within(-1.0, 1.0) + radius * r.within(-1.0, 1.0));
             if kind != TriangleKind::Behind {
                 p[2] = p[2].abs().max(0.3);
-            } else if r.bits().is_multiple_of(3) {
+            } else if r.next_word().is_multiple_of(3) {
                 p[2] = r.within(-4.0, 1.0);
             }
             if kind == TriangleKind::Grid {
                 p = p.map(|c| (4.0 * c).round() / 4.0);
-                p[2] = [0.5, 1.0, 2.0, 4.0][r.bits() as usize % 4];
+                p[2] = [0.5, 1.0, 2.0, 4.0][r.next_word() as usize % 4];
                 p[0] = p[0].round();
             }
             if let View::Perspective { .. } = view { [p[0] * p[2], p[1] * p[2], p[2]] } else { p }
@@ -129,11 +113,11 @@ struct Point {
     z: f64,
 }
 
-fn point(ends: &[[[f64; 3]; 3]; 2], view: &View, within: &Region, r: &mut Numbers) -> Point {
-    let (u, v) = (r.odd(within.u[0], within.u[1]), r.odd(within.v[0], within.v[1]));
-    let t = r.odd(within.t[0], within.t[1]);
-    let first = r.odd(0.0, 1.0);
-    let second = r.odd(0.0, 1.0) * (1.0 - first);
+fn point(ends: &[[[f64; 3]; 3]; 2], view: &View, within: &Region, r: &mut SplitMix) -> Point {
+    let (u, v) = (odd(r, within.u), odd(r, within.v));
+    let t = odd(r, within.t);
+    let first = odd(r, [0.0, 1.0]);
+    let second = odd(r, [0.0, 1.0]) * (1.0 - first);
     point_at(ends, view, [u, v, t], [first, second, 1.0 - first - second])
 }
 
@@ -153,12 +137,13 @@ fn aimed(
     view: &View,
     within: &Region,
     grid: &Grid,
-    r: &mut Numbers,
+    r: &mut SplitMix,
 ) -> Option<Point> {
-    let (u, v) = (r.odd(within.u[0], within.u[1]), r.odd(within.v[0], within.v[1]));
-    let t = r.odd(within.t[0], within.t[1]);
+    let (u, v) = (odd(r, within.u), odd(r, within.v));
+    let t = odd(r, within.t);
     let mut place = |axis: usize, count: u32| {
-        grid.origin[axis] + grid.tile[axis] * ((r.bits() % u64::from(count)) as f64 + r.within(0.01, 0.99))
+        grid.origin[axis]
+            + grid.tile[axis] * ((r.next_word() % u64::from(count)) as f64 + r.within(0.01, 0.99))
     };
     let at = [place(0, grid.columns), place(1, grid.rows)];
     let [s, a] = lens(view);
@@ -228,7 +213,7 @@ fn check(
     grid: &Grid,
     ends: &[[[f64; 3]; 3]; 2],
     points: u32,
-    r: &mut Numbers,
+    r: &mut SplitMix,
 ) {
     let moving = MovingTriangle::new(ends[0], ends[1]).unwrap();
     let mut reported = HashMap::new();
@@ -260,7 +245,7 @@ fn check(
 fn no_tile_is_missed_and_nothing_lies_outside() {
     for view in VIEWS {
         for kind in KINDS {
-            let (mut found, mut r) = (Found::default(), Numbers::new(7));
+            let (mut found, mut r) = (Found::default(), SplitMix::new(7));
             for round in 0..150_u32 {
                 let clip = if round % 3 == 0 {
                     Region { u: [-0.5, 0.25], v: [0.0, 0.0], t: [0.25, 0.75] }
@@ -291,10 +276,10 @@ fn no_tile_is_missed_and_nothing_lies_outside() {
 fn a_corner_cut_off_by_a_rounding_is_reported() {
     let grid = Grid { origin: [1e6, -1e6], ..GRID };
     for view in VIEWS {
-        let (mut r, mut checked, mut missed) = (Numbers::new(5), 0, 0);
+        let (mut r, mut checked, mut missed) = (SplitMix::new(5), 0, 0);
         for round in 0..3000_u32 {
-            let (u, v, t) = (r.odd(-1.0, 1.0), r.odd(-1.0, 1.0), r.odd(0.0, 1.0));
-            let corner = [0, 1].map(|axis| grid.origin[axis] + (1 + r.bits() % 15) as f64);
+            let (u, v, t) = (odd(&mut r, [-1.0, 1.0]), odd(&mut r, [-1.0, 1.0]), odd(&mut r, [0.0, 1.0]));
+            let corner = [0, 1].map(|axis| grid.origin[axis] + (1 + r.next_word() % 15) as f64);
             let way = [r.within(-1.0, 1.0), r.within(-1.0, 1.0)];
             let speed = r.within(0.0, 1e3);
             let mut ends = [[[0.0; 3]; 3]; 2];
@@ -335,7 +320,7 @@ fn the_false_positive_rate_of_tiles_is_low() {
     {
         for view in VIEWS {
             let ratios = [0, 2, 4].map(|halvings| {
-                let (mut found, mut r) = (Found::default(), Numbers::new(11));
+                let (mut found, mut r) = (Found::default(), SplitMix::new(11));
                 for _ in 0..16 {
                     let ends = triangle(kind, &view, &mut r);
                     let rasterizer = Rasterizer::new(view).halving(halvings);
@@ -353,7 +338,7 @@ fn the_false_positive_rate_of_tiles_is_low() {
 /// A custom hierarchy of tiles, from coarse to fine, finds no more than the grid does.
 #[test]
 fn tiles_can_be_walked_by_hand() {
-    let mut r = Numbers::new(3);
+    let mut r = SplitMix::new(3);
     let rasterizer = Rasterizer::new(VIEWS[3]);
     let ends = triangle(TriangleKind::Ordinary, &VIEWS[3], &mut r);
     let moving = MovingTriangle::new(ends[0], ends[1]).unwrap();

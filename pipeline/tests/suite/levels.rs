@@ -115,7 +115,7 @@ fn levels_of(size: [u32; 2], format: Format, paint: impl Fn([i32; 2]) -> f32 + S
 }
 
 fn noise([x, y]: [i32; 2]) -> f32 {
-    (random::mix(random::mix(x as u64) ^ y as u64) >> 40) as f32 / 16_777_216.0
+    random::unit_single(random::mix(random::mix(x as u64) ^ y as u64))
 }
 
 #[test]

@@ -259,18 +259,18 @@ fn quadratic_roots(lane: &Lane, [a, b, c]: [f64; 3]) -> impl Iterator<Item = f64
 
 #[cfg(test)]
 mod tests {
-    use super::super::generator::tests::{Uniform, turned, warped};
+    use super::super::generator::tests::{hit, turned, uniform, warped};
     use super::*;
 
     #[test]
     fn every_position_in_a_beam_is_found() {
-        let (mut random, mut several) = (Uniform::new(1), 0);
+        let (mut random, mut several) = (uniform(1), 0);
         for round in 0..4000 {
             let beam = match round % 4 {
                 0 => turned(&mut random),
                 kind => warped(&mut random, [0.0, 0.4, 1.5][kind - 1]),
             };
-            let hit = random.hit();
+            let hit = hit(&mut random);
             let point = beam.point(&hit);
             let found: Vec<Hit> = beam.inside(&Lane::default(), point).collect();
             several += usize::from(found.len() > 1);
@@ -285,10 +285,10 @@ mod tests {
 
     #[test]
     fn a_point_can_have_three_hits() {
-        let mut random = Uniform::new(7);
+        let mut random = uniform(7);
         let most = (0..3000).map(|_| {
             let beam = turned(&mut random);
-            let point = beam.point(&random.hit());
+            let point = beam.point(&hit(&mut random));
             beam.inside(&Lane::default(), point).count()
         });
         assert_eq!(most.max(), Some(3));
@@ -297,7 +297,7 @@ mod tests {
     #[test]
     fn points_outside_are_outside() {
         // Brute force: counts how often the triangle's plane crosses the point over many times.
-        let mut random = Uniform::new(3);
+        let mut random = uniform(3);
         let mut outside = 0;
         for _ in 0..400 {
             let beam = warped(&mut random, 0.6);
@@ -331,11 +331,11 @@ mod tests {
 
     #[test]
     fn the_jacobian_is_the_derivative_and_its_sign_shows_crossed_sides() {
-        let mut random = Uniform::new(5);
+        let mut random = uniform(5);
         let mut crossed = 0;
         for round in 0..500 {
             let beam = if round % 2 == 0 { warped(&mut random, 0.8) } else { turned(&mut random) };
-            let hit = random.hit();
+            let hit = hit(&mut random);
             let h = 1e-6;
             let moved = |weights: [f64; 3], t: f64| beam.point(&Hit { weights, t });
             let [a, b, c] = hit.weights;

@@ -268,7 +268,7 @@ fn outer(lane: &Lane, part: &Beam, sign: f64, into: &mut BoundingVolume) {
 
 #[cfg(test)]
 mod tests {
-    use super::super::generator::tests::{Uniform, turned, warped};
+    use super::super::generator::tests::{hit, turned, uniform, warped};
     use super::*;
 
     /// Whether a ray hits a back face (Moeller and Trumbore 1997).
@@ -289,7 +289,7 @@ mod tests {
     #[test]
     fn bounding_volumes_contain_their_beam() {
         for method in [BeamMethod::Refined, BeamMethod::Hull, BeamMethod::Prism] {
-            let (mut random, mut volume) = (Uniform::new(11), BoundingVolume::new());
+            let (mut random, mut volume) = (uniform(11), BoundingVolume::new());
             for round in 0..1200 {
                 let beam = match round % 6 {
                     0 => turned(&mut random),
@@ -297,7 +297,7 @@ mod tests {
                 };
                 method.bounding_volumes(&Lane::default(), &beam, &mut volume);
                 for _ in 0..20 {
-                    let hit = random.hit();
+                    let hit = hit(&mut random);
                     let along = DVec3::from_array([0; 3].map(|_| random.within(-1.0, 1.0)));
                     assert!(leaves(&volume, beam.point(&hit), along), "{method:?} {round}: {hit:?}");
                 }
@@ -307,7 +307,7 @@ mod tests {
 
     #[test]
     fn a_straight_beam_is_its_own_prism() {
-        let mut random = Uniform::new(2);
+        let mut random = uniform(2);
         for _ in 0..50 {
             let beam = warped(&mut random, 0.0);
             for method in [BeamMethod::Refined, BeamMethod::Hull, BeamMethod::Prism] {
@@ -325,7 +325,7 @@ mod tests {
     /// rasterized once.
     #[test]
     fn bodies_have_every_face_once() {
-        let mut random = Uniform::new(4);
+        let mut random = uniform(4);
         let crosses = |[a, b, c]: &[DVec3; 3], [x, y]: [f64; 2]| {
             let edge = |p: &DVec3, q: &DVec3| (p.x - x) * (q.y - y) - (q.x - x) * (p.y - y);
             edge(a, b) > 0.0 && edge(b, c) > 0.0 && edge(c, a) > 0.0
@@ -343,7 +343,7 @@ mod tests {
                 let mut volume = BoundingVolume::new();
                 hull_faces(&Lane::default(), &beam, &mut volume);
                 for _ in 0..40 {
-                    let point = beam.point(&random.hit());
+                    let point = beam.point(&hit(&mut random));
                     let count = volume.iter().filter(|face| crosses(face, [point.x, point.y])).count();
                     assert!(count <= 1, "{round}: {count} of {volume:?}");
                     covered += count;

@@ -376,14 +376,14 @@ pub(super) fn within_reach(lane: &Lane, reach: &Reach, first: [f64; 2]) -> u64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::caustics::generator::tests::{Uniform, warped};
+    use crate::caustics::generator::tests::{hit, uniform, warped};
 
     /// Any point of any beam is within the times found at its pixel, and in a tile that is found.
     #[test]
     fn every_point_of_a_beam_is_covered() {
         let view = [DVec3::new(0.0, 0.0, -9.0), DVec3::ZERO, DVec3::new(0.3, 1.0, 0.0)];
         let eye = Eye::new([view[0] + 4.0 * DVec3::X, view[1], view[2]], 4.0, [96, 96]).unwrap();
-        let mut random = Uniform::new(21);
+        let mut random = uniform(21);
         for round in 0..400 {
             let Some(seen) = eye.see(&warped(&mut random, [0.0, 0.3, 0.8, 1.5][round % 4])) else { continue };
             let mut cover = Cover::new(&eye, BeamMethod::Moving, 0..12);
@@ -394,7 +394,7 @@ mod tests {
                 .rasterize(&triangle, &cover.grid, |tile, _| tiles.push(tile));
             cover.each(&seen, |_, _| ());
             for _ in 0..50 {
-                let hit = random.hit();
+                let hit = hit(&mut random);
                 let point = seen.image.point(&hit);
                 let found = times(&eye, &seen, [point.x, point.y]);
                 let near = |t: f64| {
@@ -416,7 +416,7 @@ mod tests {
     #[test]
     fn pixels_within_reach_are_those_between_its_bounds() {
         let (first, mut some) = ([-3.5, 12.5], 0);
-        let mut random = Uniform::new(5);
+        let mut random = uniform(5);
         for _ in 0..500 {
             let reach = first.map(|from| {
                 let ends = [(); 2].map(|()| random.within(from - 3.0, from + 10.0));

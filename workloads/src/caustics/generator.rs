@@ -215,29 +215,21 @@ pub(in crate::caustics) mod tests {
     use crate::caustics::Hit;
 
     /// Uniform numbers.
-    pub struct Uniform(SplitMix);
+    pub fn uniform(seed: u64) -> SplitMix {
+        SplitMix::new(mix(seed ^ 0xCA05_71C5))
+    }
 
-    impl Uniform {
-        pub fn new(seed: u64) -> Self {
-            Self(SplitMix::new(mix(seed ^ 0xCA05_71C5)))
+    /// A random position in a beam.
+    pub fn hit(random: &mut SplitMix) -> Hit {
+        let (mut b, mut c) = (random.next_unit(), random.next_unit());
+        if b + c > 1.0 {
+            (b, c) = (1.0 - b, 1.0 - c);
         }
-
-        pub fn within(&mut self, low: f64, high: f64) -> f64 {
-            low + (high - low) * self.0.next_unit()
-        }
-
-        /// A random position in a beam.
-        pub fn hit(&mut self) -> Hit {
-            let (mut b, mut c) = (self.within(0.0, 1.0), self.within(0.0, 1.0));
-            if b + c > 1.0 {
-                (b, c) = (1.0 - b, 1.0 - c);
-            }
-            Hit { weights: [1.0 - b - c, b, c], t: self.within(0.0, 1.0) }
-        }
+        Hit { weights: [1.0 - b - c, b, c], t: random.next_unit() }
     }
 
     /// A beam along z whose directions vary by up to `warp`.
-    pub fn warped(random: &mut Uniform, warp: f64) -> Beam {
+    pub fn warped(random: &mut SplitMix, warp: f64) -> Beam {
         let open = [0; 3].map(|_| DVec3::new(random.within(-1.0, 1.0), random.within(-1.0, 1.0), 0.0));
         let (lean, length) = ([random.within(-0.3, 0.3), random.within(-0.3, 0.3)], random.within(1.5, 3.0));
         let close = open.map(|p| {
@@ -249,7 +241,7 @@ pub(in crate::caustics) mod tests {
     }
 
     /// A short beam that twists by about 180 degrees, so that its sides cross.
-    pub fn turned(random: &mut Uniform) -> Beam {
+    pub fn turned(random: &mut SplitMix) -> Beam {
         let open = [0; 3].map(|_| DVec3::new(random.within(-1.0, 1.0), random.within(-1.0, 1.0), 0.0));
         let (sin, cos) = random.within(2.5, 3.8).sin_cos();
         let close =

@@ -360,7 +360,7 @@ pub fn accuracy_warnings(ocean: &Ocean, beams: &[Beam]) -> Vec<Warning> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::caustics::generator::tests::{Uniform, turned, warped};
+    use crate::caustics::generator::tests::{hit, turned, uniform, warped};
     use crate::job::testing::hardware;
     use crate::scene::Overrides;
     use activity::{Counts, Event};
@@ -461,10 +461,10 @@ mod tests {
 
     #[test]
     fn every_point_of_a_beam_is_in_its_box() {
-        let mut random = Uniform::new(8);
+        let mut random = uniform(8);
         for round in 0..2000 {
             let beam = if round % 2 == 0 { warped(&mut random, 0.8) } else { turned(&mut random) };
-            let inside = beam.point(&random.hit());
+            let inside = beam.point(&hit(&mut random));
             let bounds = BoundingBox::of(&beam);
             assert!(bounds.contains(inside));
             let far = inside + DVec3::splat(12.0);

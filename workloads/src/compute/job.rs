@@ -1,7 +1,7 @@
 //! The job `compute`: raster passes draw a scene, and groups of lanes work on what they stored.
 
 use glam::{Vec3, Vec4};
-use pipeline::random::mix;
+use pipeline::random::{mix, unit_single};
 use pipeline::surface::{Format, SurfaceSpec};
 use pipeline::texture::LUMINANCE;
 use pipeline::{
@@ -149,10 +149,8 @@ impl Compute {
             return Ok(Vec::new());
         };
         let radius = self.options.light_radius * (high - low).length();
-        let uniform = |light: u32, axis: u64| {
-            let word = mix(mix(self.seed ^ axis << 32) ^ u64::from(light));
-            (word >> 40) as f32 / 16_777_216.0
-        };
+        let uniform =
+            |light: u32, axis: u64| unit_single(mix(mix(self.seed ^ axis << 32) ^ u64::from(light)));
         let centre = |light| low + (high - low) * Vec3::from([0, 1, 2].map(|axis| uniform(light, axis)));
         Ok((0..self.options.lights).map(|light| LightSphere { centre: centre(light), radius }).collect())
     }

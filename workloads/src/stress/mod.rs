@@ -280,7 +280,7 @@ impl SceneBuilder {
 
     /// Random number between `low` and `high`.
     pub fn between(&mut self, low: f64, high: f64) -> f64 {
-        low + (high - low) * self.random.next_unit()
+        self.random.within(low, high)
     }
 
     /// Random number between `low` and `high`, uniform in its logarithm.

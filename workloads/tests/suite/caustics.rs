@@ -123,23 +123,15 @@ fn energy_is_kept() {
     }
 }
 
-struct Photons(SplitMix);
-
-impl Photons {
-    fn uniform(&mut self) -> f64 {
-        self.0.next_unit()
+/// Start and end of a photon of a random beam, in proportion to flux.
+fn photon(random: &mut SplitMix, beams: &[Beam], until: &[f64]) -> [DVec3; 2] {
+    let at = random.next_unit() * until[until.len() - 1];
+    let beam = &beams[until.partition_point(|sum| *sum < at)];
+    let (mut b, mut c) = (random.next_unit(), random.next_unit());
+    if b + c > 1.0 {
+        (b, c) = (1.0 - b, 1.0 - c);
     }
-
-    /// Start and end of a photon of a random beam, in proportion to flux.
-    fn ray(&mut self, beams: &[Beam], until: &[f64]) -> [DVec3; 2] {
-        let at = self.uniform() * until[until.len() - 1];
-        let beam = &beams[until.partition_point(|sum| *sum < at)];
-        let (mut b, mut c) = (self.uniform(), self.uniform());
-        if b + c > 1.0 {
-            (b, c) = (1.0 - b, 1.0 - c);
-        }
-        [&beam.open, &beam.close].map(|x| x[0] * (1.0 - b - c) + x[1] * b + x[2] * c)
-    }
+    [&beam.open, &beam.close].map(|x| x[0] * (1.0 - b - c) + x[1] * b + x[2] * c)
 }
 
 /// Chi-square of counts against expectations, and the number of bins.
@@ -173,9 +165,9 @@ fn photons_on_the_floor_follow_the_image() {
         let [x, y] = [place % side, place / side].map(|at| at / fine as usize);
         expected[y * bins as usize + x] += light * pixel_m2 / per_photon;
     }
-    let (mut counts, mut random) = (vec![0.0; expected.len()], Photons(SplitMix::new(9)));
+    let (mut counts, mut random) = (vec![0.0; expected.len()], SplitMix::new(9));
     for _ in 0..photons {
-        let [from, to] = random.ray(&beams, &until);
+        let [from, to] = photon(&mut random, &beams, &until);
         let at = from + (to - from) * ((FLOOR.height_m - from.y) / (to.y - from.y));
         let place = eye.image(at) + DVec3::splat(0.5 * f64::from(bins * fine));
         let [x, y] = [place.x, place.y].map(|at| (at / f64::from(fine)) as usize);
@@ -206,14 +198,14 @@ fn photon_paths_follow_the_image_of_the_volume() {
     let image = draw(&beams, &eye, BeamMethod::Moving, Some(LightQuantity::Volume));
     // Random positions on rays, each of which represents a part of the path.
     let places = 200_000;
-    let mut random = Photons(SplitMix::new(4));
+    let mut random = SplitMix::new(4);
     let (mut counts, mut expected) = (vec![0.0; 24 * 16], vec![0.0; 24 * 16]);
     let mut path = 0.0;
     for _ in 0..places {
-        let [from, to] = random.ray(&beams, &until);
+        let [from, to] = photon(&mut random, &beams, &until);
         let length = (to - from).length();
         path += length;
-        let place = eye.image(from + random.uniform() * (to - from));
+        let place = eye.image(from + random.next_unit() * (to - from));
         let [x, y] = [(place.x + 240.0) / 20.0, (place.y + 160.0) / 20.0].map(|at| at.floor() as i64);
         if (0..24).contains(&x) && (0..16).contains(&y) {
             counts[(y * 24 + x) as usize] += length;

@@ -26,11 +26,11 @@ impl Uniform {
     }
 
     pub fn next(&mut self) -> f32 {
-        (self.0.next_word() >> 40) as f32 / 16_777_216.0
+        self.within(0.0, 1.0)
     }
 
     pub fn within(&mut self, lo: f32, hi: f32) -> f32 {
-        lo + (hi - lo) * self.next()
+        self.0.within_single(lo, hi)
     }
 }
 
