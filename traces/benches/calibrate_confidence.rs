@@ -6,7 +6,6 @@
 //! of `auto`, or `auto` without STEP, one of `traces::frames::FinderStep`.
 
 use std::error::Error;
-use std::process::ExitCode;
 use traces::Trace;
 use traces::energy::{TOLERANCE_S, pairs, true_frames};
 use traces::frames::{
@@ -34,17 +33,7 @@ struct Case {
     right: bool,
 }
 
-fn main() -> ExitCode {
-    match run() {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("error: {error}");
-            ExitCode::FAILURE
-        }
-    }
-}
-
-fn run() -> Result<(), Box<dyn Error>> {
+fn main() -> Result<(), Box<dyn Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).filter(|arg| arg != "--bench").collect();
     let [first, last, which @ ..] = arguments.as_slice() else {
         return Err("usage: calibrate_confidence FIRST_SEED LAST_SEED [METHOD|STEP]".into());

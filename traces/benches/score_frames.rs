@@ -17,7 +17,6 @@ use case::Case;
 use outcome::{Outcome, floor};
 use std::error::Error;
 use std::path::{Path, PathBuf};
-use std::process::ExitCode;
 use traces::frames::FinderMethod;
 
 /// The request.
@@ -27,16 +26,6 @@ struct Options {
     cases: Vec<String>,
     json: Option<PathBuf>,
     dirs: Vec<PathBuf>,
-}
-
-fn main() -> ExitCode {
-    match options().and_then(|options| run(&options)) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("error: {error}");
-            ExitCode::FAILURE
-        }
-    }
 }
 
 fn options() -> Result<Options, Box<dyn Error>> {
@@ -61,7 +50,8 @@ fn options() -> Result<Options, Box<dyn Error>> {
     Ok(options)
 }
 
-fn run(options: &Options) -> Result<(), Box<dyn Error>> {
+fn main() -> Result<(), Box<dyn Error>> {
+    let options = options()?;
     if options.dirs.is_empty() {
         println!(
             "nothing to score: score_frames [--method M] [--cases A,B] [--several] [--json FILE] DIR..."
@@ -80,7 +70,7 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
             if !options.cases.is_empty() && !options.cases.contains(&name) {
                 continue;
             }
-            let row = score_case(&path, options)?;
+            let row = score_case(&path, &options)?;
             medians.push(row["f1"].as_f64().unwrap_or_default());
             rows.push(row);
         }
