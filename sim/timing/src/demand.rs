@@ -10,6 +10,25 @@ use crate::LINE_BYTES;
 use crate::clock::{Clocks, Time};
 use crate::spec::{DATA_EVENTS, DataUnit, MachineSpec};
 
+/// What a warp on the shader cores is part of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum WarpKind {
+    /// A packet of vertices.
+    Vertices,
+    /// A packet of pixels, or a group.
+    Pixels,
+}
+
+impl WarpKind {
+    /// Both kinds.
+    pub const ALL: [Self; 2] = [Self::Vertices, Self::Pixels];
+
+    /// The kind that takes turns with this one.
+    pub fn other(self) -> Self {
+        if self == Self::Vertices { Self::Pixels } else { Self::Vertices }
+    }
+}
+
 /// A station on the path of a packet. The shader cores are two stations, one for vertices and one for pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 #[repr(u8)]

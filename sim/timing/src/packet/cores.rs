@@ -10,7 +10,7 @@ use super::slots::{Occupancy, Slots, Turns};
 use super::station::{Service, aligned};
 use super::{Span, Visit};
 use crate::clock::{Clocks, Time};
-use crate::demand::{CYCLE, DemandBuilder, Server, ServiceDemand, Station, Work, share, time_of};
+use crate::demand::{CYCLE, DemandBuilder, Server, ServiceDemand, Station, WarpKind, Work, share, time_of};
 use crate::spec::{DataUnit, MachineSpec};
 
 /// Cycles per slot of the calendars.
@@ -57,7 +57,7 @@ impl Run {
     }
 }
 
-/// Sending of the warps of one kind of packets (vertices or pixels): when the next may be sent, and how many of
+/// Sending of the warps of one kind: when the next may be sent, and how many of
 /// that cycle have been.
 #[derive(Clone, Debug, Default)]
 struct Sender {
@@ -107,7 +107,7 @@ impl DataState {
 /// All cores and data units.
 #[derive(Clone, Debug)]
 pub(super) struct Cores {
-    senders: [Sender; 2],
+    senders: [Sender; WarpKind::ALL.len()],
     vertices: VertexQueue,
     residents: Residents,
     /// Warps sent, and the part of a cycle that one takes.
@@ -191,24 +191,25 @@ impl Cores {
     /// when [`Self::leave`] says so.
     pub fn run(&mut self, visit: &Visit<'_>, builder: &DemandBuilder, memory: &mut Memory) -> Run {
         let demand = visit.demand;
-        let kind = usize::from(visit.station == Station::Pixel);
+        let is_pixel = visit.station == Station::Pixel;
+        let kind = if is_pixel { WarpKind::Pixels } else { WarpKind::Vertices };
         let warps = demand.warps(self.warp_lanes);
-        let came = if kind == 0 { visit.arrive.max(self.vertices.flights.room_at()) } else { visit.arrive };
-        let taken = came.max(self.senders[kind].sent);
+        let came = if is_pixel { visit.arrive } else { visit.arrive.max(self.vertices.flights.room_at()) };
+        let taken = came.max(self.senders[kind as usize].sent);
         let mut room = taken;
-        if kind == 1 {
+        if is_pixel {
             room = taken.max(visit.room);
             self.residents.enter(demand, warps);
         }
         let mut run = Run { taken, done: taken, departed: None, data: None, memory: Span::NONE };
-        let data_unit = (kind == 1 && demand.uses_data()).then(|| demand.data_unit());
+        let data_unit = (is_pixel && demand.uses_data()).then(|| demand.data_unit());
         let mut first = 0;
         while first < warps {
-            let from = room.max(self.senders[kind].sent);
+            let from = room.max(self.senders[kind as usize].sent);
             let (chunk, from, slots) =
                 self.next(visit, Chunk { first, count: warps - first, of: warps }, came, from);
             let sent = self.send(kind, from, chunk.count, slots, data_unit);
-            if kind == 1 {
+            if is_pixel {
                 self.note_turns(&chunk, came, sent);
             }
             let mut ready = Span { from: sent.from + self.period, to: sent.to + self.period };
@@ -217,16 +218,16 @@ impl Cores {
             }
             let done = self.operate(visit, &chunk, sent.from, ready);
             match kind {
-                0 => {
+                WarpKind::Vertices => {
                     self.vertices.slots.hold(chunk.count, done.from, done.to);
                     self.residents.start_vertices(demand, warps, chunk.count, ready);
                 }
-                _ => self.residents.start(chunk.count, ready),
+                WarpKind::Pixels => self.residents.start(chunk.count, ready),
             }
             run.done = run.done.max(done.to);
             first += chunk.count;
         }
-        if kind == 1 {
+        if is_pixel {
             self.residents.done_after(run.done);
             return run;
         }
@@ -270,14 +271,14 @@ impl Cores {
 
     /// Send warps, as many in a cycle as the machine can, as slots on the cores and in front of the data unit
     /// become free. Returns when the first and the last warp are sent.
-    fn send(&mut self, kind: usize, from: Time, warps: u32, slots: Span, unit: Option<DataUnit>) -> Span {
+    fn send(&mut self, kind: WarpKind, from: Time, warps: u32, slots: Span, unit: Option<DataUnit>) -> Span {
         let room = |count| {
             let slots = if count == 1 { slots.from } else { slots.to };
             unit.map_or(slots, |unit| slots.max(self.data[unit as usize].queue.room_for(count)))
         };
         let (first, last) = (room(1), room(warps));
         let (begin, sent) = self.sends.reserve(from.max(first), u64::from(warps) * self.period);
-        let (sender, work) = (&mut self.senders[kind], self.send_work);
+        let (sender, work) = (&mut self.senders[kind as usize], self.send_work);
         let end =
             begin + self.period * ((sender.server.used_at(begin) + Work::from(warps - 1) * work) / CYCLE);
         let to = sent.saturating_sub(self.period).max(end).max(last);

@@ -20,7 +20,7 @@ use self::shader::{CoreEnv, Shader};
 use self::sources::Sources;
 use self::stage::{Stage, StageEnv};
 use crate::clock::{Clocks, Time};
-use crate::demand::{CYCLE, DemandBuilder, ServiceDemand, Station, Work, port};
+use crate::demand::{CYCLE, DemandBuilder, ServiceDemand, Station, WarpKind, Work, port};
 use crate::draws::{DrawTimes, Passes};
 use crate::recorder::Reason;
 use crate::spec::{Common, DataUnit, MachineSpec};
@@ -423,17 +423,19 @@ struct CoresEnv<'w, 'a> {
 }
 
 impl CoreEnv for CoresEnv<'_, '_> {
-    fn served(&mut self, kind: usize, packet: u32, from: Time, to: Time) {
+    fn served(&mut self, kind: WarpKind, packet: u32, from: Time, to: Time) {
         self.shared.count(Unit::Shader, packet, from, to);
-        if kind == 1 {
+        if kind == WarpKind::Pixels {
             let unit = self.shared.stream.demands[packet as usize].data_unit().unit();
             self.shared.count(unit, packet, from, to);
         }
     }
 
-    fn leave(&mut self, kind: usize, packet: u32, now: Time) -> Result<(), Unit> {
-        let (station, next) =
-            if kind == 0 { (Station::Vertex, &mut *self.setup) } else { (Station::Pixel, &mut *self.colour) };
+    fn leave(&mut self, kind: WarpKind, packet: u32, now: Time) -> Result<(), Unit> {
+        let (station, next) = match kind {
+            WarpKind::Vertices => (Station::Vertex, &mut *self.setup),
+            WarpKind::Pixels => (Station::Pixel, &mut *self.colour),
+        };
         self.shared.leave(station, packet, now, Some(next))
     }
 }

@@ -6,7 +6,7 @@ use activity::Unit;
 
 use super::queue::Queue;
 use crate::clock::{Clocks, Time};
-use crate::demand::{ServiceDemand, share};
+use crate::demand::{ServiceDemand, WarpKind, share};
 use crate::recorder::Reason;
 use crate::spec::{DATA_EVENTS, DataUnit, MachineSpec};
 
@@ -22,7 +22,7 @@ struct Flight {
     to: Time,
 }
 
-/// Packets of one kind (vertices or pixels) on the cores, in order.
+/// Packets of one kind on the cores, in order.
 #[derive(Clone, Debug, Default)]
 struct PacketFifo {
     flights: VecDeque<Flight>,
@@ -46,10 +46,10 @@ struct Sending {
 #[derive(Clone, Debug)]
 pub(super) struct Shader {
     cores: Vec<Core>,
-    fifos: [PacketFifo; 2],
+    fifos: [PacketFifo; WarpKind::ALL.len()],
     warps: Vec<Warp>,
     free: Vec<u32>,
-    next_kind: usize,
+    next_kind: WarpKind,
     lanes: u64,
     warp_lanes: u32,
     warps_per_cycle: u32,
@@ -63,9 +63,9 @@ pub(super) struct Shader {
 /// Interface of the cores to their surroundings.
 pub(super) trait CoreEnv {
     /// Record that a packet was on the cores from `from` to `to`.
-    fn served(&mut self, kind: usize, packet: u32, from: Time, to: Time);
+    fn served(&mut self, kind: WarpKind, packet: u32, from: Time, to: Time);
     /// Pass a packet on. The error is the unit that has no room.
-    fn leave(&mut self, kind: usize, packet: u32, now: Time) -> Result<(), Unit>;
+    fn leave(&mut self, kind: WarpKind, packet: u32, now: Time) -> Result<(), Unit>;
 }
 
 impl Shader {
@@ -86,7 +86,7 @@ impl Shader {
             fifos: Default::default(),
             warps: Vec::new(),
             free: Vec::new(),
-            next_kind: 0,
+            next_kind: WarpKind::Vertices,
             lanes: u64::from(spec.lanes),
             warp_lanes: spec.warp_lanes.get(),
             warps_per_cycle: spec.warps_per_cycle.get(),
@@ -111,7 +111,7 @@ impl Shader {
         &mut self,
         now: Time,
         demands: &[ServiceDemand],
-        mut inputs: [&mut Queue<u32>; 2],
+        mut inputs: [&mut Queue<u32>; WarpKind::ALL.len()],
         mut data: [&mut Queue<u32>; DataUnit::ALL.len()],
         env: &mut impl CoreEnv,
     ) -> (bool, u32, Option<Reason>) {
@@ -127,7 +127,7 @@ impl Shader {
         }
         let mut reason = None;
         for _ in 0..self.warps_per_cycle {
-            for (kind, input) in inputs.iter_mut().enumerate() {
+            for (kind, input) in WarpKind::ALL.into_iter().zip(&mut inputs) {
                 loop {
                     let retired = self.retire(kind, now, env, &mut reason);
                     let taken = self.take(kind, now, demands, input);
@@ -180,7 +180,7 @@ impl Shader {
             }
             core.slots += 1;
             self.free.push(id);
-            let fifo = &mut self.fifos[warp.kind];
+            let fifo = &mut self.fifos[warp.kind as usize];
             let flight = &mut fifo.flights[(warp.number - fifo.retired) as usize];
             flight.remaining -= 1;
             flight.to = now;
@@ -204,12 +204,12 @@ impl Shader {
 
     fn retire(
         &mut self,
-        kind: usize,
+        kind: WarpKind,
         now: Time,
         env: &mut impl CoreEnv,
         reason: &mut Option<Reason>,
     ) -> bool {
-        let fifo = &mut self.fifos[kind];
+        let fifo = &mut self.fifos[kind as usize];
         let Some(&flight) = fifo.flights.front() else { return false };
         if flight.remaining > 0 {
             return false;
@@ -225,8 +225,8 @@ impl Shader {
     }
 
     /// Accept the next packet once all warps of the previous one are sent.
-    fn take(&mut self, kind: usize, now: Time, demands: &[ServiceDemand], input: &mut Queue<u32>) -> bool {
-        let fifo = &mut self.fifos[kind];
+    fn take(&mut self, kind: WarpKind, now: Time, demands: &[ServiceDemand], input: &mut Queue<u32>) -> bool {
+        let fifo = &mut self.fifos[kind as usize];
         if fifo.sending.is_some() || fifo.flights.len() >= self.in_flight {
             return false;
         }
@@ -258,20 +258,20 @@ impl Shader {
         demands: &[ServiceDemand],
         data: [&mut Queue<u32>; DataUnit::ALL.len()],
     ) -> bool {
-        let turns = [self.next_kind, 1 - self.next_kind];
-        let Some(kind) = turns.into_iter().find(|&kind| self.fifos[kind].sending.is_some()) else {
+        let turns = [self.next_kind, self.next_kind.other()];
+        let Some(kind) = turns.into_iter().find(|&kind| self.fifos[kind as usize].sending.is_some()) else {
             return false;
         };
-        let Some(sending) = self.fifos[kind].sending else { return false };
+        let Some(sending) = self.fifos[kind as usize].sending else { return false };
         let Sending { packet, sent: part, warps: parts, .. } = sending;
         let demand = &demands[packet as usize];
-        let uses_data = kind == 1 && demand.uses_data();
+        let uses_data = kind == WarpKind::Pixels && demand.uses_data();
         let [texture, compute] = data;
         let queue = if demand.group.is_some() { compute } else { texture };
         let Some(core) = self.place(&sending, demand).filter(|_| !uses_data || queue.room(now) > 0) else {
             return false;
         };
-        let fifo = &mut self.fifos[kind];
+        let fifo = &mut self.fifos[kind as usize];
         let number = fifo.retired + fifo.flights.len() as u64 - 1;
         let warp = Warp::new(demand, &sending, (kind, number), core);
         let is_group = demand.group.is_some();
@@ -289,7 +289,7 @@ impl Shader {
         } else {
             self.cores[core].fresh.push_back((now + self.period, id));
         }
-        self.next_kind = 1 - kind;
+        self.next_kind = kind.other();
         true
     }
 
@@ -303,7 +303,7 @@ impl Shader {
     }
 
     /// Earliest time of possible work if no other unit acts.
-    pub fn wakes_at(&self, now: Time, inputs: [&Queue<u32>; 2]) -> Option<Time> {
+    pub fn wakes_at(&self, now: Time, inputs: [&Queue<u32>; WarpKind::ALL.len()]) -> Option<Time> {
         let inputs = inputs.into_iter().filter_map(Queue::head_at);
         let cores = self.cores.iter().filter(|core| !core.is_empty()).flat_map(|core| {
             let queues = [&core.fresh, &core.fetched, &core.cooling];
@@ -323,8 +323,7 @@ pub(super) struct Warp {
     /// Number of the warp in its packet.
     pub part: u32,
     pub parts: u32,
-    /// 0 for vertices, 1 for pixels.
-    pub kind: usize,
+    kind: WarpKind,
     /// Number of its packet among those of its kind.
     pub number: u64,
     pub threads: u32,
@@ -338,7 +337,7 @@ pub(super) struct Warp {
 }
 
 impl Warp {
-    fn new(demand: &ServiceDemand, sending: &Sending, (kind, number): (usize, u64), core: usize) -> Self {
+    fn new(demand: &ServiceDemand, sending: &Sending, (kind, number): (WarpKind, u64), core: usize) -> Self {
         let Sending { packet, sent: part, warps: parts, .. } = *sending;
         let threads = share(demand.threads, part, parts).len() as u32;
         let operations = threads.saturating_mul(demand.ops);
