@@ -9,7 +9,6 @@ use output::OutputError;
 use output::plot::{ChartPanel, Scale, Series};
 use output::terminal::Progress;
 use power_model::{EnergyTable, Platform, PowerModel};
-use rayon::prelude::*;
 use run::{GpuSpec, JobFrame, RunError};
 use serde::Serialize;
 use workloads::deferred::{Deferred, DeferredOptions, LightPass, LightingMethod, LightingRate, NormalFormat};
@@ -17,9 +16,9 @@ use workloads::scene::{Local, Node, Parts, Rig, Scene, SceneCamera, Trs};
 use workloads::{Alpha, Material, Overrides, shapes};
 
 use crate::chart::{errors, mean_square};
-use crate::study::table::{Sheet, TableBuilder, count, fixed, plain};
+use crate::study::table::{Sheet, TableBuilder, count, fixed, millis, plain};
 use crate::study::tradeoff::{Metric, TradeoffPoint};
-use crate::study::{Gallery, Study, StudyError};
+use crate::study::{Gallery, Study, StudyError, each};
 
 /// How much is drawn.
 #[derive(Clone, Copy, Debug, Serialize)]
@@ -155,13 +154,7 @@ impl Study for DeferredChart {
             .flat_map(|sweep| sweep.values(effort).into_iter().map(move |value| (sweep, value)))
             .collect();
         let bench = Bench::new(effort)?;
-        let bar = progress.bar("deferred", cases.len() as u64);
-        let rows = |&(sweep, value): &(DeferredSweep, u32)| {
-            let rows = bench.rows(sweep, value);
-            bar.inc();
-            rows
-        };
-        let rows: Vec<Vec<DeferredRow>> = cases.par_iter().map(rows).collect::<Result<_, RunError>>()?;
+        let rows = each(&cases, ("deferred", progress), |&(sweep, value)| bench.rows(sweep, value))?;
         Ok(Self { effort, rows: rows.concat() })
     }
 
@@ -192,8 +185,8 @@ impl Study for DeferredChart {
             .column("sweep", "varies", |row| row.sweep.name(), plain)
             .column("value", "value", |row| row.value, plain)
             .column("method", "method", |row| row.method, plain)
-            .column("frame_s", "frame (ms)", |row| row.frame_s, |seconds| fixed(3)(1e3 * seconds))
-            .column("frame_j", "energy (mJ)", |row| row.frame_j, |joules| fixed(3)(1e3 * joules))
+            .column("frame_s", "frame (ms)", |row| row.frame_s, millis(3))
+            .column("frame_j", "energy (mJ)", |row| row.frame_j, millis(3))
             .column("dram_bytes", "memory (bytes)", |row| row.dram_bytes, count)
             .column("shader_ops", "shader operations", |row| row.shader_ops, count)
             .column("g_buffer_bytes", "G-buffer (B/pixel)", |row| row.g_buffer_bytes, plain)

@@ -2,16 +2,15 @@
 
 use activity::{Event, Unit};
 use output::OutputError;
-use output::plot::{AxisSpec, ChartPanel, Paint, PlotMark, Scale, Series};
+use output::plot::{ChartPanel, Scale, Series};
 use output::terminal::Progress;
 use power_model::Part;
-use rayon::prelude::*;
 use run::{Change, GpuSpec, Plan, RunError, RunFrame, RunOptions, frames_of};
 use serde::Serialize;
 use workloads::Overrides;
 
-use crate::study::table::{Sheet, TableBuilder, fixed, plain, share};
-use crate::study::{Gallery, Study, StudyError};
+use crate::study::table::{Sheet, TableBuilder, fixed, millis, optional, plain, share};
+use crate::study::{Gallery, Study, StudyError, each};
 
 /// Drawn: a scene of one pass, and a workload whose passes read what earlier ones wrote.
 const WORK: [&str; 2] = ["default", "soft-shadows"];
@@ -35,7 +34,7 @@ pub struct MemoryEffort {
 }
 
 /// One frame with one size of a level.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Default, Serialize)]
 pub struct MemoryRow {
     /// The scene or workload.
     pub work: &'static str,
@@ -81,13 +80,8 @@ impl Study for MemoryChart {
             .iter()
             .flat_map(|&work| SWEEPS.into_iter().flat_map(sizes).map(move |case| (work, case)))
             .collect();
-        let bar = progress.bar("sizes", cases.len() as u64);
-        let row = |&(work, (level, size_mb)): &(&'static str, (Unit, f64))| {
-            let row = measure(work, level, size_mb, effort);
-            bar.inc();
-            row
-        };
-        Ok(Self { effort, rows: cases.par_iter().map(row).collect::<Result<_, RunError>>()? })
+        let row = |&(work, (level, size_mb)): &_| measure(work, level, size_mb, effort);
+        Ok(Self { effort, rows: each(&cases, ("sizes", progress), row)? })
     }
 
     fn draw(&self, to: &Gallery<'_>) -> Result<(), OutputError> {
@@ -108,24 +102,19 @@ impl Study for MemoryChart {
             .column("work", "work", |row| row.work, plain)
             .column("level", "level", |row| row.level, plain)
             .column("size_mb", "MB", |row| row.size_mb, plain)
-            .column(
-                "dram_bytes",
-                "memory (MB)",
-                |row| row.dram_bytes,
-                |bytes| fixed(2)(bytes as f64 / BYTES_PER_MB),
-            )
-            .column("hit_share", "hits", |row| row.hit_share, |hits| hits.map_or("-".to_owned(), share(1)))
-            .column("memory_j", "memory (mJ)", |row| row.memory_j, millijoules)
-            .column("frame_j", "frame (mJ)", |row| row.frame_j, millijoules)
-            .column("frame_s", "frame (ms)", |row| row.frame_s, |seconds| fixed(2)(1e3 * seconds))
+            .column("dram_bytes", "memory (MB)", |row| row.dram_bytes, megabytes)
+            .column("hit_share", "hits", |row| row.hit_share, optional(share(1)))
+            .column("memory_j", "memory (mJ)", |row| row.memory_j, millis(2))
+            .column("frame_j", "frame (mJ)", |row| row.frame_j, millis(2))
+            .column("frame_s", "frame (ms)", |row| row.frame_s, millis(2))
             .after(pays.collect::<String>() + "\n")
             .csv("memory.csv");
         vec![rows.sheet()]
     }
 }
 
-fn millijoules(joules: f64) -> String {
-    format!("{:.2}", 1e3 * joules)
+fn megabytes(bytes: u64) -> String {
+    fixed(2)(bytes as f64 / BYTES_PER_MB)
 }
 
 fn measure(
@@ -212,24 +201,14 @@ impl MemoryChart {
     }
 
     fn panel(&self, name: &str, unit: &str, of: fn(&MemoryRow) -> f64) -> ChartPanel {
-        let series = self.sweeps().enumerate().map(|(number, rows)| {
-            let points = rows.iter().map(|row| (row.size_mb * BYTES_PER_MB, of(row))).collect();
-            let label = format!("{} ({})", rows[0].level, rows[0].work);
-            Series::new(&label, PlotMark::Curve(points)).painted(Paint::Like(number))
+        let curves = self.sweeps().map(|rows| {
+            let points = rows.iter().map(|row| (row.size_mb * BYTES_PER_MB, of(row)));
+            Series::curve(format!("{} ({})", rows[0].level, rows[0].work), points)
         });
-        let across = AxisSpec {
-            name: "size of the level".to_owned(),
-            unit: "B".to_owned(),
-            scale: Scale::Doublings,
-            zero: "none".to_owned(),
-        };
-        let up = AxisSpec {
-            name: name.to_owned(),
-            unit: unit.to_owned(),
-            scale: Scale::FromZero,
-            ..AxisSpec::default()
-        };
-        ChartPanel::over("", [across, up], series.collect())
+        ChartPanel::new("", ["size of the level", name], curves.collect())
+            .on(Scale::Doublings, Scale::FromZero)
+            .in_units(["B", unit])
+            .zeros(["none", ""])
     }
 }
 
@@ -264,16 +243,7 @@ mod tests {
     #[test]
     fn a_size_pays_while_a_larger_one_saves_a_percent() {
         let rows = |energies: &[f64]| -> Vec<MemoryRow> {
-            let row = |(size_mb, frame_j)| MemoryRow {
-                work: "",
-                level: "",
-                size_mb,
-                dram_bytes: 0,
-                hit_share: None,
-                memory_j: 0.0,
-                frame_j,
-                frame_s: 0.0,
-            };
+            let row = |(size_mb, frame_j)| MemoryRow { size_mb, frame_j, ..MemoryRow::default() };
             [0.0, 1.0, 2.0, 4.0].into_iter().zip(energies.iter().copied()).map(row).collect()
         };
         assert_eq!(pays_up_to(&rows(&[10.0, 8.0, 7.0, 6.95])), 2.0);

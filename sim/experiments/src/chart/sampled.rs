@@ -6,7 +6,7 @@ use std::path::Path;
 
 use cpu_time::ProcessTime;
 use output::OutputError;
-use output::plot::{AxisSpec, ChartPanel, Paint, PlotMark, Series};
+use output::plot::{ChartPanel, Paint, PlotMark, Series};
 use output::terminal::Progress;
 use run::{
     Distinct, Forecast, Plan, Previews, RunError, RunFrame, RunOptions, RunQuantity, Sampling, Signatures,
@@ -225,8 +225,6 @@ fn figures(quantity: &'static str, trials: &[Trial]) -> TrialFigures {
 impl SampledChart {
     /// Errors of a quantity over half-widths of intervals.
     fn panel(&self, quantity: &'static str) -> ChartPanel {
-        let axis =
-            |name: &str| AxisSpec { name: name.to_owned(), zero: "exact".to_owned(), ..AxisSpec::default() };
         let trials: Vec<&Trial> = self.trials.iter().filter(|trial| trial.quantity == quantity).collect();
         let widths = || trials.iter().map(|trial| trial.half_width_percent).filter(|width| *width > 0.0);
         let ends = [widths().reduce(f64::min), widths().reduce(f64::max)];
@@ -238,8 +236,8 @@ impl SampledChart {
             let dots = PlotMark::Dots(trials.iter().map(dot).collect());
             series.push(Series::new(&trials[0].scene, dots).painted(Paint::Like(number)));
         }
-        let axes = [axis("half-width of the 95 % interval (%)"), axis("error (%)")];
-        ChartPanel::over(quantity, axes, series)
+        let axes = ["half-width of the 95 % interval (%)", "error (%)"];
+        ChartPanel::new(quantity, axes, series).zeros(["exact"; 2])
     }
 }
 

@@ -3,7 +3,6 @@
 use std::path::Path;
 
 use pipeline::{LensShape, PassError, SampleTable, Viewport};
-use rayon::prelude::*;
 use serde::Serialize;
 use workloads::Overrides;
 use workloads::stress::Size;
@@ -12,9 +11,9 @@ use crate::stress::family_named;
 use crate::stress::measure::{MethodWork, Pairs, SWITCHES, Subject, combinations, differing, on_subject};
 use crate::study::table::{Sheet, TableBuilder, fixed, plain, share};
 use crate::study::tradeoff::{Metric, TradeoffPoint, front};
-use crate::study::{Gallery, Study, StudyError};
+use crate::study::{Gallery, Study, StudyError, each};
 use output::OutputError;
-use output::plot::{AxisSpec, ChartPanel, Paint, PlotMark, Scale, Series};
+use output::plot::{ChartPanel, Paint, PlotMark, Scale, Series};
 use output::terminal::Progress;
 use run::{GpuSpec, RunError};
 
@@ -87,20 +86,14 @@ impl Study for TileTestsChart {
 
     fn measure(effort: TileTestsEffort, files: &[String], progress: &Progress) -> Result<Self, StudyError> {
         let gpu = GpuSpec::load("reference")?;
-        let scenes = SCENES.map(str::to_owned);
-        let bar = progress.bar("scenes", (FAMILIES.len() + scenes.len() + files.len()) as u64);
-        let families = FAMILIES.par_iter().map(|&(name, value)| {
-            let rows = of_family(name, value, &effort, &gpu);
-            bar.inc();
-            rows
-        });
-        let loaded = scenes.par_iter().chain(files).map(|name| {
-            let rows = of_scene(name, &effort, &gpu);
-            bar.inc();
-            rows
-        });
-        let rows: Vec<Vec<TileTestsRow>> = families.chain(loaded).collect::<Result<_, RunError>>()?;
-        Ok(Self { rows: rows.into_iter().flatten().collect() })
+        let scenes = SCENES.into_iter().chain(files.iter().map(String::as_str)).map(|name| (name, None));
+        let families = FAMILIES.map(|(name, value)| (name, Some(value)));
+        let cases: Vec<(&str, Option<f64>)> = families.into_iter().chain(scenes).collect();
+        let rows = |&(name, value): &(&str, Option<f64>)| match value {
+            Some(value) => of_family(name, value, &effort, &gpu),
+            None => of_scene(name, &effort, &gpu),
+        };
+        Ok(Self { rows: each(&cases, ("scenes", progress), rows)?.concat() })
     }
 
     fn draw(&self, to: &Gallery<'_>) -> Result<(), OutputError> {
@@ -164,7 +157,7 @@ impl Study for TileTestsChart {
 }
 
 fn of_family(
-    name: &'static str,
+    name: &str,
     value: f64,
     effort: &TileTestsEffort,
     gpu: &GpuSpec,
@@ -254,11 +247,7 @@ impl TileTestsChart {
             )
             .painted(Paint::Like(1)),
         ];
-        let axes = [
-            AxisSpec { name: "cost over the least".to_owned(), scale: Scale::Decades, ..AxisSpec::default() },
-            AxisSpec { name: up.to_owned(), scale: Scale::FromZero, ..AxisSpec::default() },
-        ];
-        ChartPanel::over("", axes, series)
+        ChartPanel::new("", ["cost over the least", up], series).on(Scale::Decades, Scale::FromZero)
     }
 
     /// Cost and gain of every combination, over the least cost and the greatest gain of each scene: geometric

@@ -17,13 +17,12 @@ use output::plot::{
 };
 use output::terminal::Progress;
 use output::{Claim, OutputError};
-use rayon::prelude::*;
 use run::{GpuSpec, RunError};
 use serde::{Serialize, Serializer};
 use workloads::stress::{Family, Size, families, family};
 
 use crate::study::table::{Sheet, TableBuilder, count, fixed, optional, plain, share};
-use crate::study::{Gallery, Study, StudyError, files};
+use crate::study::{Gallery, Study, StudyError, each, files};
 
 /// The seed of the scenes.
 const SEED: u64 = 1;
@@ -103,17 +102,14 @@ impl Study for StressChart {
         let values =
             |&family: &&'static Family| family.sweep(quick).iter().map(move |&value| (family, value));
         let cases: Vec<(&'static Family, f64)> = chosen.iter().flat_map(values).collect();
-        let bar = progress.bar("values", cases.len() as u64);
         let measure = |&(family, value): &(&'static Family, f64)| {
             let rows = measure::measure(family, value, size, &gpu, &METHODS)?;
             // Every combination of tests on a million triangles would take longer than all the rest.
             let held = family.sweep(true).contains(&value);
             let trial = held.then(|| choice::trial(family, value, size, SEED, &gpu)).transpose()?;
-            bar.inc();
-            Ok((rows, trial))
+            Ok::<_, RunError>((rows, trial))
         };
-        let measured: Vec<(Vec<StressRow>, Option<FamilyCosts>)> =
-            cases.par_iter().map(measure).collect::<Result<_, RunError>>()?;
+        let measured = each(&cases, ("values", progress), measure)?;
         let (rows, trials): (Vec<_>, Vec<_>) = measured.into_iter().unzip();
         let trials: Vec<FamilyCosts> = trials.into_iter().flatten().collect();
         let (rows, auto) = (rows.into_iter().flatten().collect(), Choices::new(&trials));

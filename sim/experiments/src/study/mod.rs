@@ -17,6 +17,7 @@ use output::plot::{Chart, ChartPanel, Picture, PlotStyle};
 use output::terminal::Progress;
 use output::{Claim, OutDir, OutputError};
 use pipeline::FrameReport;
+use rayon::prelude::*;
 use run::{GpuError, RunError};
 use serde::Serialize;
 use table::Sheet;
@@ -119,6 +120,32 @@ impl Gallery<'_> {
         let [title, subject] = titles;
         self.add(stem, &Chart::new(title, subject, panels).picture(self.plot_style))
     }
+}
+
+/// Measures every case, several at once, with a bar of this name. Results are in the order of the cases.
+pub(crate) fn each<C: Sync, R: Send, E: Send>(
+    cases: &[C],
+    (bar, progress): (&str, &Progress),
+    measure: impl Fn(&C) -> Result<R, E> + Sync,
+) -> Result<Vec<R>, E> {
+    let bar = progress.bar(bar, cases.len() as u64);
+    let one = |case| measure(case).inspect(|_| bar.inc());
+    cases.par_iter().map(one).collect()
+}
+
+/// Rows in groups, in the order of the first of each group.
+pub(crate) fn groups<'a, R>(
+    rows: impl Iterator<Item = &'a R>,
+    same: impl Fn(&R, &R) -> bool,
+) -> Vec<Vec<&'a R>> {
+    let mut groups: Vec<Vec<&R>> = Vec::new();
+    for row in rows {
+        match groups.iter_mut().find(|group| same(group[0], row)) {
+            Some(group) => group.push(row),
+            None => groups.push(vec![row]),
+        }
+    }
+    groups
 }
 
 /// A request for a study.

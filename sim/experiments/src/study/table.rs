@@ -72,7 +72,7 @@ pub fn share(decimals: usize) -> impl Fn(f64) -> String {
     move |value| format!("{:.decimals$} %", 100.0 * value)
 }
 
-/// Shows seconds as milliseconds with so many decimals, without the unit.
+/// Shows seconds as milliseconds, or joules as millijoules, with so many decimals and without the unit.
 pub fn millis(decimals: usize) -> impl Fn(f64) -> String {
     move |value| format!("{:.decimals$}", 1e3 * value)
 }

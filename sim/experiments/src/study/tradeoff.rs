@@ -7,6 +7,7 @@ use output::table::digits;
 use output::{Claim, OutDir, OutputError};
 use serde::Serialize;
 
+use super::groups;
 use super::table::{Sheet, TableBuilder, plain};
 
 /// A measured quantity of which less is better, beside that of the reference.
@@ -219,21 +220,6 @@ impl Tradeoff {
         front.dedup();
         front
     }
-}
-
-/// Points in groups, in the order of the first of each group.
-fn groups<'a>(
-    points: impl Iterator<Item = &'a TradeoffPoint>,
-    same: impl Fn(&TradeoffPoint, &TradeoffPoint) -> bool,
-) -> Vec<Vec<&'a TradeoffPoint>> {
-    let mut groups: Vec<Vec<&TradeoffPoint>> = Vec::new();
-    for point in points {
-        match groups.iter_mut().find(|group| same(group[0], point)) {
-            Some(group) => group.push(point),
-            None => groups.push(vec![point]),
-        }
-    }
-    groups
 }
 
 const TEMPLATE: &str = include_str!("../../assets/charts.html");

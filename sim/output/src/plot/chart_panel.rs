@@ -45,6 +45,20 @@ impl ChartPanel {
         self
     }
 
+    /// Sets the units of both axes, without prefixes.
+    #[must_use]
+    pub fn in_units(mut self, units: [&str; 2]) -> Self {
+        [self.axes[0].unit, self.axes[1].unit] = units.map(str::to_owned);
+        self
+    }
+
+    /// Sets the labels of zero on both axes; `0` where one is empty.
+    #[must_use]
+    pub fn zeros(mut self, labels: [&str; 2]) -> Self {
+        [self.axes[0].zero, self.axes[1].zero] = labels.map(str::to_owned);
+        self
+    }
+
     /// Makes the horizontal axis a list of these values of `name`, at positions 0, 1, ...
     #[must_use]
     pub fn along(mut self, name: &str, values: &[String]) -> Self {

@@ -18,7 +18,6 @@ use pipeline::{
     SurfaceSpec, Target, Texture, Viewport, Wrap,
 };
 use published::{PUBLISHED, Published};
-use rayon::prelude::*;
 use run::{BIN_PS, GpuSpec, RunError};
 use serde::Serialize;
 use timing::{FrameClock, Level, Recorder};
@@ -27,7 +26,7 @@ use workloads::{Light, Material};
 
 use super::quantiles;
 use crate::study::table::{Sheet, TableBuilder, plain};
-use crate::study::{Gallery, Study, StudyError};
+use crate::study::{Gallery, Study, StudyError, each};
 
 /// Largest median and single error that are aimed at, percent.
 const MEDIAN_PERCENT: f64 = 10.0;
@@ -87,13 +86,8 @@ impl Study for AnchorsChart {
     const QUICK: AnchorsEffort = AnchorsEffort { size: [512, 512] };
 
     fn measure(effort: AnchorsEffort, _: &[String], progress: &Progress) -> Result<Self, StudyError> {
-        let bar = progress.bar("rates", PUBLISHED.len() as u64);
-        let row = |published: &Published| {
-            let row = AnchorRow::new(published, effort);
-            bar.inc();
-            row
-        };
-        let mut rows: Vec<AnchorRow> = PUBLISHED.par_iter().map(row).collect::<Result<_, _>>()?;
+        let row = |published: &_| AnchorRow::new(published, effort);
+        let mut rows = each(&PUBLISHED, ("rates", progress), row)?;
         rows.sort_by(|a, b| {
             a.is_input.cmp(&b.is_input).then(b.error_percent.abs().total_cmp(&a.error_percent.abs()))
         });

@@ -4,15 +4,13 @@
 mod measure;
 
 use output::OutputError;
-use output::plot::{AxisSpec, ChartPanel, Paint, PlotMark, Scale, Series};
+use output::plot::{ChartPanel, PlotMark, Scale, Series};
 use output::terminal::Progress;
-use rayon::prelude::*;
-use run::RunError;
 use serde::Serialize;
 
-use crate::study::table::{Sheet, TableBuilder, count, fixed, optional, plain};
+use crate::study::table::{Sheet, TableBuilder, count, fixed, optional, percent, plain};
 use crate::study::tradeoff::{Metric, TradeoffPoint};
-use crate::study::{Gallery, Study, StudyError};
+use crate::study::{Gallery, Study, StudyError, each, groups};
 use measure::{Bench, CHAIN_METHOD, Case};
 
 /// How much is drawn.
@@ -94,13 +92,7 @@ impl Study for ComputeChart {
     fn measure(effort: ComputeEffort, _: &[String], progress: &Progress) -> Result<Self, StudyError> {
         let cases = Case::all();
         let bench = Bench::new(effort.size)?;
-        let bar = progress.bar("programs", cases.len() as u64);
-        let row = |case: &Case| {
-            let row = bench.row(case);
-            bar.inc();
-            row
-        };
-        Ok(Self { effort, rows: cases.par_iter().map(row).collect::<Result<_, RunError>>()? })
+        Ok(Self { effort, rows: each(&cases, ("programs", progress), |case| bench.row(case))? })
     }
 
     fn draw(&self, to: &Gallery<'_>) -> Result<(), OutputError> {
@@ -133,12 +125,7 @@ impl Study for ComputeChart {
             .column("cycles", "cycles", |row| row.cycles, |cycles| count(cycles.round() as u64))
             .column("events_j", "events (uJ)", |row| row.events_j, |joules| fixed(2)(1e6 * joules))
             .column("conflicts", "conflicts", |row| row.conflicts, |conflicts: u64| count(conflicts))
-            .column(
-                "error_percent",
-                "error",
-                |row| row.error_percent,
-                optional(|error| format!("{error:.3} %")),
-            )
+            .column("error_percent", "error", |row| row.error_percent, optional(percent(3)))
             .column("warns", "warns", |row| row.warns.join(" "), plain)
             .csv("compute.csv");
         vec![rows.sheet()]
@@ -190,16 +177,11 @@ impl ComputeRow {
 }
 
 impl ComputeChart {
-    /// Rows of each method of a sweep, in the order of the first.
-    fn methods(&self, sweep: ComputeSweep) -> Vec<(&'static str, Vec<&ComputeRow>)> {
-        let mut methods: Vec<(&'static str, Vec<&ComputeRow>)> = Vec::new();
-        for row in self.rows.iter().filter(|row| row.sweep == sweep) {
-            match methods.iter_mut().find(|(name, _)| *name == row.method) {
-                Some((_, rows)) => rows.push(row),
-                None => methods.push((row.method, vec![row])),
-            }
-        }
-        methods
+    /// A series for the rows of each method of a sweep.
+    fn methods(&self, sweep: ComputeSweep, mark: impl Fn(Vec<&ComputeRow>) -> PlotMark) -> Vec<Series> {
+        let of_sweep = self.rows.iter().filter(|row| row.sweep == sweep);
+        let methods = groups(of_sweep, |a, b| a.method == b.method).into_iter();
+        methods.map(|rows| Series::new(rows[0].method, mark(rows))).collect()
     }
 
     fn panel(
@@ -209,30 +191,17 @@ impl ComputeChart {
         scale: Scale,
         failing: Option<std::ops::Range<f64>>,
     ) -> ChartPanel {
-        let curve = |(number, (method, rows)): (usize, (&'static str, Vec<&ComputeRow>))| {
-            let points = rows.iter().map(|row| (row.value, row.cycles)).collect();
-            Series::new(method, PlotMark::Curve(points)).painted(Paint::Like(number))
+        let curve = |rows: Vec<&ComputeRow>| {
+            PlotMark::Curve(rows.iter().map(|row| (row.value, row.cycles)).collect())
         };
-        let axes = [
-            AxisSpec { name: across.to_owned(), scale, ..AxisSpec::default() },
-            AxisSpec { name: "cycles".to_owned(), ..AxisSpec::default() },
-        ];
-        let series = self.methods(sweep).into_iter().enumerate().map(curve).collect();
-        ChartPanel::over("", axes, series).failing(failing, "fails")
+        let panel = ChartPanel::new("", [across, "cycles"], self.methods(sweep, curve));
+        panel.on(scale, Scale::Decades).failing(failing, "fails")
     }
 
     fn error_panel(&self, sweep: ComputeSweep, up: &str) -> ChartPanel {
-        let curve = |(number, (method, rows)): (usize, (&'static str, Vec<&ComputeRow>))| {
-            let point = |row: &&ComputeRow| Some((row.cycles, row.error_percent?, format!("{}", row.value)));
-            let points = rows.iter().filter_map(point).collect();
-            Series::new(method, PlotMark::Dots(points)).painted(Paint::Like(number))
-        };
-        let axes = [
-            AxisSpec { name: "cycles".to_owned(), ..AxisSpec::default() },
-            AxisSpec { name: up.to_owned(), scale: Scale::FromZero, ..AxisSpec::default() },
-        ];
-        let series = self.methods(sweep).into_iter().enumerate().map(curve).collect();
-        ChartPanel::over("", axes, series)
+        let point = |row: &ComputeRow| Some((row.cycles, row.error_percent?, row.value.to_string()));
+        let dots = |rows: Vec<&ComputeRow>| PlotMark::Dots(rows.into_iter().filter_map(point).collect());
+        ChartPanel::new("", ["cycles", up], self.methods(sweep, dots)).on(Scale::Decades, Scale::FromZero)
     }
 }
 

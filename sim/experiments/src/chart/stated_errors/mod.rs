@@ -11,7 +11,7 @@ mod figures;
 
 use activity::{Bounded, PacketBuffer};
 use output::OutputError;
-use output::plot::{AxisSpec, ChartPanel, Paint, PlotMark, Scale, Series};
+use output::plot::{ChartPanel, Paint, PlotMark, Scale, Series};
 use output::terminal::Progress;
 use rayon::prelude::*;
 use run::{GpuSpec, RunError, StatedError};
@@ -231,14 +231,9 @@ impl StatedErrorsChart {
             Series::new("with a warning", PlotMark::Rings(points(true))).painted(Paint::Like(1)),
             Series::new("stated", PlotMark::Curve(line)).painted(Paint::Ink),
         ];
-        let across = AxisSpec { name: name.to_owned(), scale, ..AxisSpec::default() };
-        let up = AxisSpec {
-            name: "error of cycles (%)".to_owned(),
-            scale: Scale::Decades,
-            zero: "exact".to_owned(),
-            ..AxisSpec::default()
-        };
-        ChartPanel::over(level.name(), [across, up], series)
+        ChartPanel::new(level.name(), [name, "error of cycles (%)"], series)
+            .on(scale, Scale::Decades)
+            .zeros(["", "exact"])
     }
 }
 

@@ -1,8 +1,6 @@
 //! Speed against accuracy of all levels in one picture.
 
-use output::plot::{
-    AxisSpec, Chart, ChartPanel, Paint, Picture, PlotMark, PlotStyle, Scale, Series, SpreadPoint,
-};
+use output::plot::{Chart, ChartPanel, Paint, Picture, PlotMark, PlotStyle, Series, SpreadPoint};
 use timing::Level;
 
 use super::animations::SAMPLED;
@@ -43,20 +41,14 @@ impl TimingChart {
         series.push(key("an animation, drawn and timed", PlotMark::Dots(Vec::new())));
         series.push(key("a frame, timing alone", PlotMark::Rings(Vec::new())));
         series.push(key("median and middle half of animations", PlotMark::Spreads(Vec::new())));
-        let across = AxisSpec { name: "host time relative to stepped".to_owned(), ..AxisSpec::default() };
-        let up = AxisSpec {
-            name: "error of cycles against stepped (%)".to_owned(),
-            scale: Scale::Decades,
-            zero: "exact".to_owned(),
-            ..AxisSpec::default()
-        };
+        let axes = ["host time relative to stepped", "error of cycles against stepped (%)"];
         let frames = self.animations.first().map_or(0, |row| row.frames);
         let subject = format!(
             "animations of {frames} frames and single frames, each on all built-in GPUs; lower and further left is better. Errors of \
              animations, median (middle half, number of points): {}",
             self.medians()
         );
-        let panels = vec![ChartPanel::over("", [across, up], series)];
+        let panels = vec![ChartPanel::new("", axes, series).zeros(["", "exact"])];
         Chart::new("Speed against accuracy of the levels of timing", &subject, panels).picture(plot_style)
     }
 
