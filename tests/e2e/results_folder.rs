@@ -233,6 +233,18 @@ fn a_read_only_folder_is_refused_before_any_work() {
     }
 }
 
+/// No folder can have the name, so the request is at fault.
+#[test]
+fn a_name_that_is_too_long_is_a_wrong_request() {
+    let inputs = Inputs::new();
+    let out = inputs.path(&"x".repeat(300));
+    for command in [&["run", "tiny"][..], &["chart", "memory"], &["stress"], &["reproduce", "II"]] {
+        let ended = quintile().call(command.iter().chain(&["--out", out.as_str()]));
+        assert_eq!(ended.code, Some(2), "{}", ended.stderr);
+        assert!(ended.stderr.contains("cannot use it as the folder for results"), "{}", ended.stderr);
+    }
+}
+
 /// Every command that writes a folder follows the same rules, and none overwrites the results of another.
 #[test]
 fn commands_that_share_a_folder() {

@@ -331,6 +331,10 @@ impl From<StudyError> for RunError {
     fn from(error: StudyError) -> Self {
         match error {
             StudyError::Run(error) => error,
+            // Failures stay what they are; the rest comes from values in the settings of a paper.
+            StudyError::Frame(error) => error.into(),
+            StudyError::Job(error) => error.into(),
+            StudyError::Output(error) => error.into(),
             other => Self::setting(other),
         }
     }
@@ -373,5 +377,17 @@ impl std::iter::Sum for Ran {
             sum += one;
             sum
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_failure_in_a_study_is_no_fault_of_the_request() {
+        let failed = OutputError::Unclaimed { path: "summary.json".to_owned() };
+        assert!(!RunError::from(StudyError::from(failed)).is_usage());
+        assert!(RunError::from(StudyError::pipeline("an image without pixels")).is_usage());
     }
 }

@@ -270,12 +270,13 @@ pub enum OutputError {
 }
 
 impl OutputError {
-    /// Whether this is a usage error (exit code 2), such as a file in place of the folder, rather than a
-    /// failure (exit code 1).
+    /// Whether this is a usage error (exit code 2), such as a file in place of the folder or a name that no
+    /// folder can have, rather than a failure (exit code 1).
     pub fn is_usage(&self) -> bool {
         match self {
             Self::Folder { source, .. } => {
-                matches!(source.kind(), io::ErrorKind::NotADirectory | io::ErrorKind::AlreadyExists)
+                use io::ErrorKind::{AlreadyExists, InvalidFilename, NotADirectory};
+                matches!(source.kind(), NotADirectory | AlreadyExists | InvalidFilename)
             }
             _ => matches!(self, Self::Busy { .. } | Self::InTheWay { .. }),
         }
