@@ -16,9 +16,10 @@ const PACKET_WEIGHT: usize = 8;
 /// Weight of a part of the stream that is kept, and most parts that are.
 const PART_WEIGHT: usize = 1 << 16;
 const MAX_PARTS: usize = 8;
-/// Slices, and the weight of each.
+/// Slices, and the weight of each, unless that is about more than so many cycles.
 const SLICES: usize = 4;
 const SLICE_WEIGHT: usize = 1 << 11;
+const SLICE_CYCLES: f64 = (1u64 << 17) as f64;
 /// Error of the slices from which on all kept packets are timed.
 const DOUBT: f64 = 0.02;
 /// Frames that take more cycles are not checked.
@@ -239,9 +240,9 @@ impl Slices {
             return None;
         }
         let compare = |runs: &[Vec<Slice<'_>>]| self.compare([level, better], machine, runs).ok();
-        let mut found = compare(&self.slices())?;
         let kept: usize = self.parts.iter().map(PacketBuffer::len).sum();
-        let cycles = of_frame as f64 * kept as f64 / self.packets as f64;
+        let cycles = of_frame as f64 * kept as f64 / self.packets.max(1) as f64;
+        let mut found = compare(&self.slices(cycles))?;
         if found.packets < kept && found.error.abs() >= DOUBT && cycles <= most {
             found = compare(&self.all())?;
         }
@@ -280,11 +281,13 @@ impl Slices {
         if self.every == 1 { vec![parts.collect()] } else { parts.map(|part| vec![part]).collect() }
     }
 
-    /// Slices around points at even distances, none of them in two parts; all that is kept if it is little more.
-    fn slices(&self) -> Vec<Vec<Slice<'_>>> {
+    /// Slices of what is kept, which takes about `cycles`, around points at even distances; none is in two parts. All of
+    /// it if it is little more.
+    fn slices(&self, cycles: f64) -> Vec<Vec<Slice<'_>>> {
         let weights: Vec<usize> = self.parts.iter().map(|part| part.iter().map(weight).sum()).collect();
         let all: usize = weights.iter().sum();
-        if all <= SLICES * SLICE_WEIGHT {
+        let length = SLICE_WEIGHT.min((SLICE_CYCLES * all as f64 / cycles) as usize);
+        if all <= SLICES * length {
             return self.all();
         }
         let mut slices: Vec<Vec<Slice<'_>>> = Vec::new();
@@ -294,7 +297,7 @@ impl Slices {
                 point -= weights[at];
                 at += 1;
             }
-            let [from, to] = [point.saturating_sub(SLICE_WEIGHT / 2), point + SLICE_WEIGHT / 2];
+            let [from, to] = [point.saturating_sub(length / 2), point + (length / 2).max(1)];
             let slice = Slice::new(&self.parts[at], [from, to]).after(slices.last().map(|last| last[0]));
             slices.extend(slice.map(|slice| vec![slice]));
         }
@@ -350,16 +353,18 @@ mod tests {
 
     #[test]
     fn slices_are_at_even_distances_of_weight() {
-        let of = |packets, lines: fn(u32) -> usize| of(&slices(packets, lines).slices());
+        let sliced = |packets, lines: fn(u32) -> usize| of(&slices(packets, lines).slices(1e3));
         // An eighth on either side of the first and the last.
-        assert_eq!(of(6400, |_| 0), [672, 2272, 3872, 5472].map(|first| (first, 256)));
+        assert_eq!(sliced(6400, |_| 0), [672, 2272, 3872, 5472].map(|first| (first, 256)));
+        // A packet of each that takes longer than a slice should.
+        assert_eq!(of(&slices(6400, |_| 0).slices(1e10)), [800, 2400, 4000, 5600].map(|first| (first, 1)));
         // Little more than four slices.
-        assert_eq!(of(1024, |_| 0), [(0, 1024)]);
+        assert_eq!(sliced(1024, |_| 0), [(0, 1024)]);
         // A packet with nearly all lines is in one slice.
-        assert_eq!(of(400, |packet| if packet == 200 { 90_000 } else { 0 }), [(200, 1)]);
+        assert_eq!(sliced(400, |packet| if packet == 200 { 90_000 } else { 0 }), [(200, 1)]);
         // The last packets have nearly all lines.
         let late = |packet| if packet < 1000 { 0 } else { 10_000 };
-        let first: Vec<_> = of(1010, late).into_iter().map(|(first, _)| first).collect();
+        let first: Vec<_> = sliced(1010, late).into_iter().map(|(first, _)| first).collect();
         assert_eq!(first, [1000, 1003, 1005, 1008]);
     }
 
