@@ -21,7 +21,7 @@ const SLICES: usize = 4;
 const SLICE_WEIGHT: usize = 1 << 11;
 const SLICE_CYCLES: f64 = (1u64 << 17) as f64;
 /// Error of the slices from which on all kept packets are timed.
-const DOUBT: f64 = 0.02;
+const LARGE_ERROR: f64 = 0.02;
 /// Frames that take more cycles are not checked.
 const MAX_FRAME_CYCLES: u64 = crate::packet::MAX_CYCLES / 4;
 
@@ -243,7 +243,7 @@ impl Slices {
         let kept: usize = self.parts.iter().map(PacketBuffer::len).sum();
         let cycles = of_frame as f64 * kept as f64 / self.packets.max(1) as f64;
         let mut found = compare(&self.slices(cycles))?;
-        if found.packets < kept && found.error.abs() >= DOUBT && cycles <= most {
+        if found.packets < kept && found.error.abs() >= LARGE_ERROR && cycles <= most {
             found = compare(&self.all())?;
         }
         if judge(better).is_none() {
@@ -400,10 +400,10 @@ mod tests {
             .map(|level| cycles(all.iter(), level, machine(&units)).unwrap() as f64);
         let check = |level, cycles| slices.check(level, machine(&units), cycles).unwrap();
         let of_packet = check(Level::Packet, packet as u64);
-        assert!(of_packet.packets < all.len() && of_packet.error.abs() < DOUBT, "{of_packet:?}");
+        assert!(of_packet.packets < all.len() && of_packet.error.abs() < LARGE_ERROR, "{of_packet:?}");
         let found = check(Level::Bound, bound as u64);
         let error = bound / packet * (1.0 + of_packet.error) - 1.0;
-        assert!((found.error - error).abs() < 1e-12 && error.abs() > DOUBT, "{found:?}");
+        assert!((found.error - error).abs() < 1e-12 && error.abs() > LARGE_ERROR, "{found:?}");
         assert_eq!((found.packets, found.of, found.better), (of_packet.packets, all.len(), Level::Packet));
         // Too long for that.
         let sliced = check(Level::Bound, 1 << 24);
@@ -417,7 +417,7 @@ mod tests {
         let empty = Slices::default().check(Level::Bound, machine(&units), 0).unwrap();
         assert_eq!((empty.of, empty.error), (0, 0.0));
         let exact = slices(9, |_| 1).check(Level::Packet, machine(&units), 100).unwrap();
-        assert!(exact.of == 9 && exact.error.abs() < DOUBT, "{exact:?}");
+        assert!(exact.of == 9 && exact.error.abs() < LARGE_ERROR, "{exact:?}");
     }
 
     #[test]
