@@ -275,7 +275,8 @@ impl PointLight {
         let square = lane.dot(to_light, to_light);
         let length = lane.max(lane.sqrt(square), f32::MIN_POSITIVE);
         let [facing, glint] = at.lobes(lane, lane.scale(to_light, lane.recip(length)));
-        let fade = lane.max(lane.madd(square, -1.0 / (self.range * self.range), 1.0), 0.0);
+        let falloff = -lane.recip(lane.mul(self.range, self.range));
+        let fade = lane.max(lane.madd(square, falloff, 1.0), 0.0);
         let color = lane.scale(self.color, lane.mul(fade, fade));
         let diffuse = lane.mul(at.base, lane.scale(color, facing));
         lane.madd(Vec3::splat(glint), color, diffuse)

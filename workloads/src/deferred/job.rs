@@ -10,7 +10,9 @@ use pipeline::{
 use serde::{Deserialize, Serialize};
 use warnings::{Code, Warning};
 
-use super::{CameraRays, Forward, GBuffer, NormalFormat, Screen, Volume, Writer, bounds, point_lights};
+use super::{
+    CameraRays, Forward, GBuffer, LightBuffer, NormalFormat, Screen, Volume, Writer, bounds, point_lights,
+};
 use crate::error::LoadError;
 use crate::job::{
     Drawn, DrawsScene, Fact, Flag, Flags, IMAGE_SIZE, Job, JobError, JobOptions, JobRequest, Need,
@@ -186,7 +188,8 @@ impl DrawsScene for Deferred {
             Viewport::new(settings.width, settings.height).ok_or_else(|| JobError::setting(IMAGE_SIZE))?;
         let samples = self.samples.per_pixel();
         let lit = gpu.create_surface(&SurfaceSpec::new("lit samples", viewport, LIT).sampled(samples));
-        let stage = Stage { job: self, frame, viewport, lit, screen: Corners::of(frame, viewport) };
+        let (lights, screen) = (LightBuffer::new(gpu, &self.lights), Corners::of(frame, viewport));
+        let stage = Stage { job: self, frame, viewport, lit, lights, screen };
         let surfaces = stage.surfaces(gpu)?;
         let lit_runs = match self.options.method {
             LightingMethod::Forward => stage.forward(&surfaces, gpu)?,
@@ -252,6 +255,7 @@ struct Stage<'a> {
     viewport: Viewport,
     /// Radiance of samples, with the covered share in the last channel.
     lit: SurfaceId,
+    lights: LightBuffer,
     screen: Corners,
 }
 
@@ -304,9 +308,11 @@ impl<'a> Stage<'a> {
         targets: &Attachments,
         gpu: &mut Gpu<'_>,
     ) -> Result<u64, JobError> {
-        let forward = |of: &&Surfaced<'a>| Forward { surface: of.shader, lights: &self.job.lights };
+        let forward = |of: &&Surfaced<'a>| Forward { surface: of.shader, lights: self.lights };
         let shaders: Vec<Forward<'_>> = surfaces.iter().map(forward).collect();
-        let draws = surfaces.iter().zip(&shaders).map(|(of, shader)| Draw { shader, ..of.draw });
+        let bindings = [self.lights.binding()];
+        let draws =
+            surfaces.iter().zip(&shaders).map(|(of, shader)| Draw { shader, ..of.draw }.binding(&bindings));
         self.pass(name, &draws.collect::<Vec<_>>(), targets, gpu, false)
     }
 
@@ -335,11 +341,13 @@ impl<'a> Stage<'a> {
         let per_sample = rate == LightingRate::Sample;
         let (reader, rays) = (buffer.reader(per_sample), CameraRays::new(self.camera()));
         let Some(first) = surfaces.first() else { return Ok(0) };
-        let (all, bindings) = (&self.job.lights[..], buffer.bindings());
-        let in_loop = if lighting == LightPass::Screen { all } else { &[] };
+        let [base, normal, depth] = buffer.bindings();
+        let bindings = [base, normal, depth, self.lights.binding()];
+        let (all, lights, by_volumes) = (&self.job.lights, self.lights, lighting == LightPass::Volumes);
+        let in_loop = (!by_volumes && !all.is_empty()).then_some(lights);
         let screen = Screen { reader, rays, scene: *first.shader.lighting(), lights: in_loop };
-        let volumes: Vec<Lit> =
-            all[in_loop.len()..].iter().map(|&light| Lit::new(Volume { reader, rays, light })).collect();
+        let volume = |(light, at): (u32, &PointLight)| Lit::new(at, Volume { reader, rays, lights, light });
+        let volumes: Vec<Lit> = (0..).zip(all).filter(|_| by_volumes).map(volume).collect();
         let mut draws = vec![self.screen.draw(&screen, &bindings)?];
         for volume in &volumes {
             draws.push(volume.draw(&bindings)?);
@@ -365,8 +373,7 @@ struct Lit {
 
 impl Lit {
     /// The box is a little larger than the range, so that rounding takes nothing away.
-    fn new(shader: Volume) -> Self {
-        let PointLight { position, range, .. } = shader.light;
+    fn new(&PointLight { position, range, .. }: &PointLight, shader: Volume) -> Self {
         let mesh = shapes::cuboid(Vec3::splat(2.0 * range * 1.001), 0);
         let corners = mesh.positions.iter().map(|corner| *corner + position).collect();
         Self { shader, corners, triangles: mesh.triangles }

@@ -12,8 +12,8 @@ mod job;
 
 use glam::{Vec3, Vec4};
 use pipeline::{
-    Attachment, Attachments, Binding, Camera, Clear, Format, Gpu, Lane, Outputs, Shader, ShadingPoint,
-    SurfaceId, SurfaceSpec, Texture, Viewport,
+    Attachment, Attachments, Binding, Buffer, Camera, Clear, Format, Gpu, Lane, Outputs, Shader,
+    ShadingPoint, SurfaceId, SurfaceSpec, Texture, Viewport,
 };
 use serde::{Deserialize, Serialize};
 
@@ -207,10 +207,44 @@ fn bounds(frame: &Frame) -> [Vec3; 2] {
     [low, high]
 }
 
+/// Words of a light in memory: position, colour and range.
+const LIGHT_WORDS: u32 = 7;
+
+/// Point lights in memory, one after another.
+#[derive(Clone, Copy, Debug)]
+struct LightBuffer(Buffer<f32>);
+
+impl LightBuffer {
+    pub fn new(gpu: &mut Gpu<'_>, lights: &[PointLight]) -> Self {
+        let words = |light: &PointLight| {
+            let ([x, y, z], [r, g, b]) = (light.position.to_array(), light.color.to_array());
+            [x, y, z, r, g, b, light.range]
+        };
+        Self(gpu.buffer("lights", &lights.iter().flat_map(words).collect::<Vec<f32>>()))
+    }
+
+    /// What the passes that read it bind.
+    pub fn binding(&self) -> Binding<'static> {
+        Binding::Buffer(self.0.reads())
+    }
+
+    pub fn get(&self, lane: &Lane, light: u32) -> PointLight {
+        let [x, y, z, r, g, b, range] =
+            [0, 1, 2, 3, 4, 5, 6].map(|word| lane.load(self.0, LIGHT_WORDS * light + word));
+        PointLight { position: Vec3::new(x, y, z), color: Vec3::new(r, g, b), range }
+    }
+
+    /// Radiance of a point under all lights on top of that under the `scene`'s.
+    pub fn add(&self, lane: &Lane, scene: Vec3, at: &LitPoint, position: Vec3) -> Vec3 {
+        let lights = (0..self.0.len() / LIGHT_WORDS).map(|light| self.get(lane, light));
+        lights.fold(scene, |sum, light| lane.add(sum, light.radiance(lane, at, position)))
+    }
+}
+
 /// A surface under the light of its scene and point lights.
 struct Forward<'a> {
     pub surface: &'a SurfaceShader,
-    pub lights: &'a [PointLight],
+    pub lights: LightBuffer,
 }
 
 impl Shader for Forward<'_> {
@@ -224,8 +258,7 @@ impl Shader for Forward<'_> {
             return point.base.extend(opacity);
         }
         let scene = self.surface.lighting().radiance(lane, &point);
-        let add = |sum, light: &PointLight| lane.add(sum, light.radiance(lane, &point, at.position));
-        self.lights.iter().fold(scene, add).extend(opacity)
+        self.lights.add(lane, scene, &point, at.position).extend(opacity)
     }
 
     fn may_discard(&self) -> bool {
@@ -258,15 +291,15 @@ impl CameraRays {
     }
 }
 
-/// Lights a G-buffer: the light of the scene and `lights`.
-struct Screen<'a> {
+/// Lights a G-buffer: the light of the scene and `lights`, if there are any.
+struct Screen {
     pub reader: Reader,
     pub rays: CameraRays,
     pub scene: Lighting,
-    pub lights: &'a [PointLight],
+    pub lights: Option<LightBuffer>,
 }
 
-impl Shader for Screen<'_> {
+impl Shader for Screen {
     fn shade(&self, lane: &Lane, at: &ShadingPoint, _: Vec4) -> Vec4 {
         let Some(stored) = self.reader.read(lane, at) else { return Vec4::ZERO };
         let point = stored.point;
@@ -274,12 +307,9 @@ impl Shader for Screen<'_> {
             return point.base.extend(1.0);
         }
         let scene = self.scene.radiance(lane, &point);
-        if self.lights.is_empty() {
-            return scene.extend(1.0);
-        }
+        let Some(lights) = self.lights else { return scene.extend(1.0) };
         let position = self.rays.at(lane, at.position, stored.depth);
-        let add = |sum, light: &PointLight| lane.add(sum, light.radiance(lane, &point, position));
-        self.lights.iter().fold(scene, add).extend(1.0)
+        lights.add(lane, scene, &point, position).extend(1.0)
     }
 }
 
@@ -287,7 +317,9 @@ impl Shader for Screen<'_> {
 struct Volume {
     pub reader: Reader,
     pub rays: CameraRays,
-    pub light: PointLight,
+    pub lights: LightBuffer,
+    /// Number of the light.
+    pub light: u32,
 }
 
 impl Shader for Volume {
@@ -295,7 +327,7 @@ impl Shader for Volume {
         let stored = self.reader.read(lane, at).filter(|stored| stored.is_lit);
         let Some(stored) = stored else { return Vec4::ZERO };
         let position = self.rays.at(lane, at.position, stored.depth);
-        self.light.radiance(lane, &stored.point, position).extend(0.0)
+        self.lights.get(lane, self.light).radiance(lane, &stored.point, position).extend(0.0)
     }
 }
 

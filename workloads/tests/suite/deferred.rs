@@ -139,6 +139,29 @@ fn counts_are_those_of_the_code_that_ran() {
     assert!(of_forward(8) - of_forward(4) > eight - four);
 }
 
+/// A light is seven words, and every pixel here is in reach of all lights.
+#[test]
+fn lights_are_read_from_memory() {
+    let (few, many) = (64, 256);
+    let read = |method, lighting, lights| {
+        let options = DeferredOptions { method, lighting, lights, range: 1e4, ..DeferredOptions::default() };
+        let small = Overrides { size: Some((16, 9)), ..overrides(1) };
+        let (_, report) = drawn(&Deferred::new(options, &small, 1).unwrap());
+        let pass = report.passes[usize::from(method == LightingMethod::Deferred)].counts();
+        [Event::DramReadBytes, Event::TextureFetches].map(|event| pass[event])
+    };
+    for (method, lighting) in [
+        (LightingMethod::Forward, LightPass::Screen),
+        (LightingMethod::Deferred, LightPass::Screen),
+        (LightingMethod::Deferred, LightPass::Volumes),
+    ] {
+        let more = [0, 1].map(|of| read(method, lighting, many)[of] - read(method, lighting, few)[of]);
+        let lights = u64::from(many - few);
+        assert!(more[0] >= lights * 7 * 4, "{method:?}, {lighting:?}: {more:?}");
+        assert!(more[1] >= lights * 7 * 16 * 9 / 2, "{method:?}, {lighting:?}: {more:?}");
+    }
+}
+
 #[test]
 fn threads_do_not_change_a_byte() {
     let options = DeferredOptions { lights: 6, lighting: LightPass::Volumes, ..DeferredOptions::default() };
