@@ -86,8 +86,10 @@ const STEP: u32 = 0x9E37_79B9;
 const PLACES: u64 = 32;
 /// Bytes of a coordinate.
 const COORDINATE_BYTES: u64 = 8;
-/// Bytes of a vertex.
+/// Bytes of a vertex, without the spans of its box.
 const VERTEX_BYTES: u32 = 12;
+/// Bytes of a span of time or lens.
+const SPAN_BYTES: u32 = 8;
 
 /// A random bijection of 32-bit words ("lowbias32", Wellons 2018).
 fn mixed(lane: &Lane, word: u32) -> u32 {
@@ -276,13 +278,15 @@ pub(super) fn draw(
     let axes = lattice.used.iter().filter(|used| **used).count() as u64;
     let point_bytes = axes * COORDINATE_BYTES;
     let results = gpu.allocate(cells.len() as u64 * PLACES * point_bytes);
-    let vertices = gpu.allocate(3 * primitives.len() as u64 * u64::from(VERTEX_BYTES));
+    let is_span = |axis: &usize| cells.iter().any(|cell| [cell.low[*axis], cell.high[*axis]] != [0.0, 1.0]);
+    let vertex_bytes = VERTEX_BYTES + (2..AXES).filter(is_span).count() as u32 * SPAN_BYTES;
+    let vertices = gpu.allocate(3 * primitives.len() as u64 * u64::from(vertex_bytes));
     let draw = ConservativeDraw {
         primitives: &primitives,
         grid: &grid,
         block: gpu.spec().tile_px,
         vertices,
-        vertex_bytes: VERTEX_BYTES,
+        vertex_bytes,
         projection: None,
     };
     let shader = Candidates { cells, lattice, within, results, point_bytes };

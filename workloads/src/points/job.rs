@@ -488,6 +488,9 @@ mod tests {
         };
         let (found, _) = poisson_disk_drawn::<D, _>(&spec, 3, draw).unwrap().unwrap();
         assert_eq!(rounds, 3);
+        // A vertex has three coordinates; those of prisms also have the ends of its span of time.
+        let counts = gpu.finish().counts();
+        assert_eq!(counts[Event::VertexBytes], (12 + 8 * (D as u64 - 2)) * counts[Event::VerticesFetched]);
         let hole = super::super::quality::largest_hole(&found.points, Domain::Torus);
         assert!(hole.radius <= radius * (1.0 + 1e-12), "{hole:?}");
         assert_eq!(super::super::quality::closer_than(&found.points, radius, Domain::Torus), 0);
