@@ -143,7 +143,8 @@ impl Lines {
     /// The lines as the texture cache sees them: those of fetches, then those of loads. The n-th loads of the
     /// lanes are one access, which reads a line once.
     pub fn accessed(mut self) -> impl Iterator<Item = u64> {
-        self.loaded.sort_unstable();
+        // Those of a lane are in order, which this sort merges.
+        self.loaded.sort();
         self.loaded.dedup();
         self.fetched.into_iter().chain(self.loaded.into_iter().map(|(_, line)| line))
     }
@@ -421,6 +422,13 @@ impl<'a> Lane<'a> {
     pub fn cos(&self, a: f64) -> f64 {
         self.count(2);
         libm::cos(a)
+    }
+
+    /// Sine of an angle, as [`Lane::cos`].
+    #[inline(always)]
+    pub fn sin(&self, a: f64) -> f64 {
+        self.count(2);
+        libm::sin(a)
     }
 
     /// Angle of a vector: a quotient, a polynomial of six terms in its square, and a selection for each octant.

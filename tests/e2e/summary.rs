@@ -272,6 +272,7 @@ fn the_work_of_passes_adds_up_to_that_of_the_run() {
         ("occlusion", &["occluders", "farthest depths", "queries", "image", "write back"]),
         ("compute", &["depth pre-pass", "light culling", "image", "display", "write back"]),
         ("deferred", &["g-buffer", "lighting", "resolve", "write back"]),
+        ("caustics", &["refraction", "beams", "light", "tone", "write back"]),
         ("glossy", &["map", "image", "write back"]),
         ("soft-shadows", &["depths", "triangles", "look-ups", "write back"]),
     ] {

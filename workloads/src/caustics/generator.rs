@@ -8,6 +8,7 @@
 use std::f64::consts::TAU;
 
 use glam::{DVec2, DVec3};
+use pipeline::Lane;
 use pipeline::random::{mix, unit};
 
 use super::Beam;
@@ -105,59 +106,92 @@ impl Ocean {
 
     /// One beam per generator triangle, at a time in seconds.
     pub fn beams(&self, time_s: f64) -> Vec<Beam> {
-        let side = self.cells as usize + 1;
-        let at = |n: usize| self.side_m * (n as f64 / f64::from(self.cells) - 0.5);
-        let pleat = |n: usize| if n % side % 2 == 1 { self.pleat } else { 0.0 };
-        let corner = |n: usize| self.corner(DVec2::new(at(n % side), at(n / side)), time_s).pleated(pleat(n));
-        let corners: Vec<Corner> = (0..side * side).map(corner).collect();
-        let cell = |n: usize| {
-            let first = n / self.cells as usize * side + n % self.cells as usize;
-            let [a, b, c, d] = [first, first + 1, first + side, first + side + 1];
-            [[a, c, b], [b, c, d]]
+        let corners = self.corners(time_s);
+        let of_row = |row| (0..2 * self.cells).map(move |number| [number, row]);
+        let all = (0..self.cells).flat_map(of_row);
+        all.map(|at| {
+            let lane = Lane::default();
+            self.beam(&lane, self.corners_of(&lane, at).map(|corner| &corners[corner as usize]))
+        })
+        .collect()
+    }
+
+    /// Corners of all triangles, row by row.
+    pub(super) fn corners(&self, time_s: f64) -> Vec<Corner> {
+        let of_row = |row| (0..=self.cells).map(move |column| [column, row]);
+        (0..=self.cells)
+            .flat_map(of_row)
+            .map(|place| self.corner_at(&Lane::default(), place, time_s))
+            .collect()
+    }
+
+    /// The corner in a column and a row.
+    pub(super) fn corner_at(&self, lane: &Lane, place: [u32; 2], time_s: f64) -> Corner {
+        let along = |number: u32| {
+            let share = lane.div(lane.number(number), f64::from(self.cells));
+            lane.mul(self.side_m, lane.sub(share, 0.5))
         };
-        let all = (0..(self.cells * self.cells) as usize).flat_map(cell);
-        all.map(|three| self.beam(three.map(|n| &corners[n]))).collect()
+        let corner = self.corner(lane, DVec2::from_array(place.map(along)), time_s);
+        let is_moved = self.pleat != 0.0 && lane.branch(lane.and(place[0], 1) == 1);
+        if is_moved { corner.pleated(lane, self.pleat) } else { corner }
+    }
+
+    /// Numbers of the corners of triangle `number` of a row, two of each square.
+    pub(super) fn corners_of(&self, lane: &Lane, [number, row]: [u32; 2]) -> [u32; 3] {
+        let side = self.cells + 1;
+        let (half, column) = (lane.and(number, 1), lane.shift_right(number, 1));
+        let first = lane.madd(row, side, column);
+        [lane.add(first, half), lane.add(first, side), lane.madd(half, side, lane.add(first, 1))]
     }
 
     /// Light that enters at a position of the square, refracted at the true waves instead of triangles:
     /// start, end, and watts per square metre of the square.
     pub fn ray(&self, at: DVec2, time_s: f64) -> ([DVec3; 2], f64) {
-        let (_, slope) = self.surface(at, time_s);
-        let corner = self.corner(at, time_s);
+        let lane = Lane::default();
+        let (_, slope) = self.surface(&lane, at, time_s);
+        let corner = self.corner(&lane, at, time_s);
         let upward = DVec3::new(-slope.x, 1.0, -slope.y);
         ([corner.position, corner.end], -self.irradiance * upward.dot(self.sun) * corner.enters)
     }
 
     /// Height of the surface, and its slopes along x and z.
-    fn surface(&self, at: DVec2, time_s: f64) -> (f64, DVec2) {
+    fn surface(&self, lane: &Lane, at: DVec2, time_s: f64) -> (f64, DVec2) {
         self.waves.iter().fold((0.0, DVec2::ZERO), |(height, slope), wave| {
-            let angle = wave.number.dot(at) - wave.rate * time_s + wave.phase;
-            let (up, down) = (wave.amplitude_m * libm::cos(angle), -wave.amplitude_m * libm::sin(angle));
-            (height + up, slope + down * wave.number)
+            let along = lane.madd(wave.number.x, at.x, lane.mul(wave.number.y, at.y));
+            let angle = lane.add(lane.madd(-wave.rate, time_s, along), wave.phase);
+            let height = lane.madd(wave.amplitude_m, lane.cos(angle), height);
+            let down = lane.mul(-wave.amplitude_m, lane.sin(angle));
+            let [x, y] = [0, 1].map(|axis| lane.madd(down, wave.number[axis], slope[axis]));
+            (height, DVec2::new(x, y))
         })
     }
 
-    fn corner(&self, at: DVec2, time_s: f64) -> Corner {
-        let (height, slope) = self.surface(at, time_s);
-        let normal = DVec3::new(-slope.x, 1.0, -slope.y).normalize();
-        let position = DVec3::new(at.x, height, at.y);
+    fn corner(&self, lane: &Lane, at: DVec2, time_s: f64) -> Corner {
+        let (height, slope) = self.surface(lane, at, time_s);
+        let normal = lane.normalize(DVec3::new(-slope.x, 1.0, -slope.y));
+        let (position, ratio) = (DVec3::new(at.x, height, at.y), 1.0 / self.index);
         // Refraction into the denser medium always has a solution.
-        let direction = refract(self.sun, normal, 1.0 / self.index).unwrap_or(self.sun);
-        let enters = transmission(-self.sun.dot(normal), -direction.dot(normal), 1.0 / self.index);
-        let length = (height + self.depth_m) / -direction.y * (1.0 + self.overshoot);
-        Corner { position, start: position, end: position + length * direction, enters }
+        let direction = refract(lane, self.sun, normal, ratio).unwrap_or(self.sun);
+        let cosines = [-lane.dot(self.sun, normal), -lane.dot(direction, normal)];
+        let enters = transmission(lane, cosines, ratio);
+        let length = lane.div(lane.add(height, self.depth_m), -direction.y);
+        let length = lane.mul(length, 1.0 + self.overshoot);
+        let end = lane.madd(direction, DVec3::splat(length), position);
+        Corner { position, start: position, end, enters }
     }
 
-    fn beam(&self, corners: [&Corner; 3]) -> Beam {
-        let enters = corners.iter().map(|corner| corner.enters).sum::<f64>() / 3.0;
-        let flux_w = self.on(&corners.map(|corner| corner.position)) * enters;
+    /// The beam between three corners.
+    pub(super) fn beam(&self, lane: &Lane, corners: [&Corner; 3]) -> Beam {
+        let [a, b, c] = corners.map(|corner| corner.enters);
+        let enters = lane.div(lane.add(lane.add(a, b), c), 3.0);
+        let flux_w = lane.mul(self.on(lane, &corners.map(|corner| corner.position)), enters);
         Beam { open: corners.map(|corner| corner.start), close: corners.map(|corner| corner.end), flux_w }
     }
 
     /// Flux of the light that hits a triangle.
-    fn on(&self, [a, b, c]: &[DVec3; 3]) -> f64 {
-        let area = 0.5 * (*b - *a).cross(*c - *a);
-        self.irradiance * -area.dot(self.sun)
+    fn on(&self, lane: &Lane, [a, b, c]: &[DVec3; 3]) -> f64 {
+        let area = lane.mul(DVec3::splat(0.5), lane.cross(lane.sub(*b, *a), lane.sub(*c, *a)));
+        lane.mul(self.irradiance, -lane.dot(area, self.sun))
     }
 }
 
@@ -168,19 +202,22 @@ const SHORTEST: f64 = 1.0 / 3.0;
 /// Largest angle of a wave from the x axis, in radians.
 const SPREAD: f64 = 1.2;
 
-struct Corner {
+/// Where light enters the water.
+pub(super) struct Corner {
     /// Position on the surface.
-    position: DVec3,
+    pub position: DVec3,
     /// Start of the beam.
-    start: DVec3,
-    end: DVec3,
+    pub start: DVec3,
+    /// Its end.
+    pub end: DVec3,
     /// Transmitted share of light.
-    enters: f64,
+    pub enters: f64,
 }
 
 impl Corner {
-    fn pleated(self, pleat: f64) -> Self {
-        Self { start: self.position.lerp(self.end, pleat), ..self }
+    fn pleated(self, lane: &Lane, pleat: f64) -> Self {
+        let [before, after] = [1.0 - pleat, pleat].map(DVec3::splat);
+        Self { start: lane.madd(self.end, after, lane.mul(self.position, before)), ..self }
     }
 }
 
@@ -191,24 +228,28 @@ pub fn reflect(incoming: DVec3, normal: DVec3) -> DVec3 {
 
 /// Direction of a refracted ray (Snell); `None` for total reflection. `normal` points against `incoming`,
 /// both of unit length. `ratio` is the refractive index on this side over that on the other.
-pub fn refract(incoming: DVec3, normal: DVec3, ratio: f64) -> Option<DVec3> {
-    let cos_in = -incoming.dot(normal);
-    let cos_out_squared = 1.0 - ratio * ratio * (1.0 - cos_in * cos_in);
-    (cos_out_squared >= 0.0)
-        .then(|| ratio * incoming + (ratio * cos_in - libm::sqrt(cos_out_squared)) * normal)
+pub fn refract(lane: &Lane, incoming: DVec3, normal: DVec3, ratio: f64) -> Option<DVec3> {
+    let cos_in = -lane.dot(incoming, normal);
+    let cos_out_squared = lane.madd(-(ratio * ratio), lane.madd(-cos_in, cos_in, 1.0), 1.0);
+    lane.branch(cos_out_squared >= 0.0).then(|| {
+        let along = lane.sub(lane.mul(ratio, cos_in), lane.root(cos_out_squared));
+        lane.madd(normal, DVec3::splat(along), lane.mul(DVec3::splat(ratio), incoming))
+    })
 }
 
-/// Share of unpolarized light that is transmitted (Fresnel), for the cosines of both angles and the ratio of
-/// [`refract`].
-pub fn transmission(cos_in: f64, cos_out: f64, ratio: f64) -> f64 {
-    let across = (ratio * cos_in - cos_out) / (ratio * cos_in + cos_out);
-    let along = (ratio * cos_out - cos_in) / (ratio * cos_out + cos_in);
-    1.0 - 0.5 * (across * across + along * along)
+/// Share of unpolarized light that is transmitted (Fresnel), for the cosines of the angles of incidence and of
+/// refraction and the ratio of [`refract`].
+pub fn transmission(lane: &Lane, [cos_in, cos_out]: [f64; 2], ratio: f64) -> f64 {
+    let reflected = |a: f64, b: f64| {
+        let a = lane.mul(ratio, a);
+        lane.div(lane.sub(a, b), lane.add(a, b))
+    };
+    let (across, along) = (reflected(cos_in, cos_out), reflected(cos_out, cos_in));
+    lane.madd(-0.5, lane.madd(across, across, lane.mul(along, along)), 1.0)
 }
 
 #[cfg(test)]
 pub(in crate::caustics) mod tests {
-    use pipeline::Lane;
     use pipeline::random::SplitMix;
 
     use super::*;
@@ -260,7 +301,7 @@ pub(in crate::caustics) mod tests {
     /// Flux of the light on the triangles, before reflection.
     fn incoming_w(ocean: &Ocean, time_s: f64) -> f64 {
         let level = Ocean { pleat: 0.0, ..ocean.clone() };
-        level.beams(time_s).iter().map(|beam| ocean.on(&beam.open)).sum()
+        level.beams(time_s).iter().map(|beam| ocean.on(&Lane::default(), &beam.open)).sum()
     }
 
     #[test]
@@ -313,7 +354,7 @@ pub(in crate::caustics) mod tests {
         let count = 20_000;
         let squares = (0..count).map(|n| {
             let at = DVec2::new(1000.0 * uniform(2 * n), 1000.0 * uniform(2 * n + 1));
-            ocean.surface(at, 0.0).1.length_squared()
+            ocean.surface(&Lane::default(), at, 0.0).1.length_squared()
         });
         let rms = (squares.sum::<f64>() / count as f64).sqrt();
         assert!((rms - 0.2).abs() < 0.004, "{rms}");
@@ -349,27 +390,36 @@ pub(in crate::caustics) mod tests {
         for degrees in [0.0_f64, 20.0, 45.0, 80.0] {
             let angle = degrees.to_radians();
             let incoming = DVec3::new(angle.sin(), -angle.cos(), 0.0);
-            let out = refract(incoming, normal, 1.0 / 1.33).unwrap();
+            let out = refract(&Lane::default(), incoming, normal, 1.0 / 1.33).unwrap();
             assert!((out.length() - 1.0).abs() < 1e-12 && out.z == 0.0);
             assert!((1.33 * out.x - incoming.x).abs() < 1e-12, "{degrees}");
             assert!((reflect(incoming, normal) - DVec3::new(incoming.x, -incoming.y, 0.0)).length() < 1e-15);
         }
         let grazing = DVec3::new(0.9, -(1.0_f64 - 0.81).sqrt(), 0.0);
-        assert!(refract(grazing, normal, 1.33).is_none(), "beyond the critical angle all is reflected");
+        assert!(
+            refract(&Lane::default(), grazing, normal, 1.33).is_none(),
+            "beyond the critical angle all is reflected"
+        );
     }
 
     #[test]
     fn transmission_follows_fresnel() {
         // Normal incidence: 4 n1 n2 / (n1 + n2)^2. At Brewster's angle the light polarized along the plane is
         // transmitted completely.
-        assert!((transmission(1.0, 1.0, 1.0 / 1.5) - 0.96).abs() < 1e-12);
+        assert!((transmission(&Lane::default(), [1.0, 1.0], 1.0 / 1.5) - 0.96).abs() < 1e-12);
         let brewster = 1.5_f64.atan();
         let (cos_in, cos_out) = (brewster.cos(), brewster.sin());
         let across = ((1.0 / 1.5 * cos_in - cos_out) / (1.0 / 1.5 * cos_in + cos_out)).powi(2);
-        assert!((transmission(cos_in, cos_out, 1.0 / 1.5) - (1.0 - 0.5 * across)).abs() < 1e-12);
+        assert!(
+            (transmission(&Lane::default(), [cos_in, cos_out], 1.0 / 1.5) - (1.0 - 0.5 * across)).abs()
+                < 1e-12
+        );
         // Transmission is the same in both directions.
         assert!(
-            (transmission(0.8, 0.9, 1.0 / 1.2) - transmission(0.9, 0.8, 1.2)).abs() < 1e-12,
+            (transmission(&Lane::default(), [0.8, 0.9], 1.0 / 1.2)
+                - transmission(&Lane::default(), [0.9, 0.8], 1.2))
+            .abs()
+                < 1e-12,
             "the same for both directions"
         );
     }

@@ -23,6 +23,7 @@ mod bound;
 mod draw;
 pub mod generator;
 mod light;
+mod refraction;
 mod shader;
 
 use glam::DVec3;
@@ -43,8 +44,9 @@ pub use draw::{LightPicture, draw};
 use generator::Ocean;
 use light::Seen;
 pub use light::{Eye, Floor, LightQuantity, Squares, error};
+use refraction::refract_on;
 pub use shader::draw_on;
-use shader::tone_on;
+use shader::{draw_stored, tone_on};
 
 /// View of the light.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -160,10 +162,10 @@ impl Draws for Caustics {
     }
 
     fn draw(&self, time_s: &f64, gpu: &mut Gpu<'_>) -> Result<Drawn, JobError> {
-        let beams = self.ocean.beams(*time_s);
         let eye = self.eye().ok_or_else(|| JobError::setting("the view has no extent"))?;
         let method = self.options.method;
-        let (picture, buffer) = draw_on(gpu, &beams, &eye, method, self.light())?;
+        let (beams, stored) = refract_on(gpu, &self.ocean, *time_s, method)?;
+        let (picture, buffer) = draw_stored(gpu, (&beams, stored), &eye, method, self.light())?;
         Ok(Drawn {
             image: tone_on(gpu, &eye, &picture.light, buffer, white(&picture.light)),
             moving: method == BeamMethod::Moving,

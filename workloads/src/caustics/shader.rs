@@ -16,18 +16,13 @@ use super::draw::{
     within_reach,
 };
 use super::light::{PixelInBeam, Seen};
+use super::refraction::{BEAM_WORDS, BeamBuffer, GROUP_LANES, VERTICES_WORDS};
 use super::{Beam, BeamMethod, Eye, LightQuantity};
 
 /// Bytes of a vertex at one end of a beam.
 const VERTEX_BYTES: u32 = 12;
-/// Bytes of the flux of a beam. The light of a moving triangle takes all else from its vertices.
-const FLUX_BYTES: u64 = 4;
-/// Words of a beam that a body bounds: the vertices at both ends, and the flux.
-const BEAM_WORDS: u32 = 19;
 /// Words of a face of a body.
 const FACE_WORDS: u32 = 9;
-/// Lanes of a group that makes bounding volumes.
-const GROUP_LANES: u32 = 64;
 /// Bytes per pixel of the buffer that accumulates light.
 const LIGHT_BYTES: u64 = 4;
 /// Bytes that mark the pixels of a tile: the number of the body that covered pixels of it last, and two words
@@ -74,14 +69,26 @@ pub(super) fn tone_on(
     drawn.images.swap_remove(0)
 }
 
-/// Draws beams in a pass of `gpu`, after one that makes their bounding volumes, if there are any. The picture
-/// is that of [`super::draw()`], and the light is in the buffer.
+/// Draws beams that are in memory in a pass of `gpu`, after one that makes their bounding volumes, if there are
+/// any. The picture is that of [`super::draw()`], and the light is in the buffer.
 ///
 /// # Errors
 /// [`PassError`] if the GPU does not take the pass that makes bounding volumes.
 pub fn draw_on(
     gpu: &mut Gpu<'_>,
     beams: &[Beam],
+    eye: &Eye,
+    method: BeamMethod,
+    light: LightQuantity,
+) -> Result<(LightPicture, LightBuffer), PassError> {
+    let buffer = BeamBuffer::new(gpu, beams.len(), method);
+    draw_stored(gpu, (beams, buffer), eye, method, light)
+}
+
+/// The same of beams in `stored`.
+pub(super) fn draw_stored(
+    gpu: &mut Gpu<'_>,
+    (beams, stored): (&[Beam], BeamBuffer),
     eye: &Eye,
     method: BeamMethod,
     light: LightQuantity,
@@ -96,9 +103,9 @@ pub fn draw_on(
     let buffer = LightBuffer { region, columns };
     let (primitives, faces) = primitives(&seen, method, &grid);
     let input = if method == BeamMethod::Moving {
-        Input::moving(gpu, primitives.len() as u64, seen.len() as u64)
+        Input::moving(&stored)
     } else {
-        Input::bodies(gpu, method, &seen, &faces)?
+        Input::bodies(gpu, method, (&seen, stored), &faces)?
     };
     let marks = gpu.allocate(u64::from(columns * rows) * MARK_STRIDE);
     let mut picture = LightPicture {
@@ -140,28 +147,28 @@ struct Input {
     vertices: MemoryRange,
     /// Bytes of a vertex.
     vertex_bytes: u32,
-    /// What the light of each beam needs beside the vertices of its primitives.
-    beams: MemoryRange,
+    /// Where what the light of each beam needs beside the vertices of its primitives begins.
+    beams: u64,
     /// Bytes of that for a beam.
     beam_bytes: u64,
 }
 
 impl Input {
-    /// The vertices of moving triangles, and the flux of each.
-    fn moving(gpu: &mut Gpu<'_>, triangles: u64, beams: u64) -> Self {
-        let vertex_bytes = 2 * VERTEX_BYTES;
-        let vertices = gpu.allocate(3 * triangles * u64::from(vertex_bytes));
-        Self { vertices, vertex_bytes, beams: gpu.allocate(beams * FLUX_BYTES), beam_bytes: FLUX_BYTES }
+    /// The vertices of moving triangles, and the flux of each, as the light takes all else from the vertices.
+    fn moving(stored: &BeamBuffer) -> Self {
+        let (vertices, vertex_bytes) = (stored.words.region(), 2 * VERTEX_BYTES);
+        let beams = vertices.address() + 4 * u64::from(VERTICES_WORDS * stored.beams);
+        Self { vertices, vertex_bytes, beams, beam_bytes: 4 }
     }
 
     /// The faces of bodies, which a pass makes from the beams.
     fn bodies(
         gpu: &mut Gpu<'_>,
         method: BeamMethod,
-        seen: &[Option<Seen>],
+        (seen, stored): (&[Option<Seen>], BeamBuffer),
         faces: &[Face],
     ) -> Result<Self, PassError> {
-        let beams = gpu.buffer("beams", &vec![0.0; seen.len() * BEAM_WORDS as usize]);
+        let beams = stored.words;
         let made = gpu.buffer("faces", &vec![0.0; faces.len() * FACE_WORDS as usize]);
         let count = gpu.buffer("count of faces", &[0]);
         let shader =
@@ -177,7 +184,7 @@ impl Input {
             })?;
             gpu.wait();
         }
-        let (vertices, beams) = (made.region(), beams.region());
+        let (vertices, beams) = (made.region(), beams.region().address());
         Ok(Self { vertices, vertex_bytes: VERTEX_BYTES, beams, beam_bytes: 4 * u64::from(BEAM_WORDS) })
     }
 }
@@ -376,7 +383,7 @@ impl TileShader for LightShader<'_> {
         let seen = self.seen[*beam].as_ref()?;
         let mut shaded = Shaded { tests: 0, lit: Vec::new() };
         let Input { beams, beam_bytes, .. } = self.input;
-        lanes.fetch(beams.address() + *beam as u64 * beam_bytes, beam_bytes);
+        lanes.fetch(beams + *beam as u64 * beam_bytes, beam_bytes);
         match corners {
             None => self.moving(lanes, seen, tile, &mut shaded),
             Some(corners) => self.face(marks, (lanes, seen), (corners, tile.tile), &mut shaded),

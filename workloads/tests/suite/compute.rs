@@ -9,15 +9,9 @@ use workloads::compute::{
 use workloads::job::{DrawsScene, Job, JobRequest, OptionSource};
 use workloads::scene::{Frame, Overrides};
 
-use crate::common::{drawn_on, spec};
+use crate::common::{drawn_on, hardware, spec};
 
-const COMPUTE: ComputeSpec =
-    ComputeSpec { warp_lanes: 32, group_lanes: 256, shared_bytes: 32768, banks: 32, atomic_units: 1 };
 const LUMINANCE: Vec3 = Vec3::new(0.2126, 0.7152, 0.0722);
-
-fn hardware() -> PipelineSpec {
-    PipelineSpec { compute: Some(COMPUTE), ..spec() }
-}
 
 fn job(options: &ComputeOptions, size: (u32, u32), samples: u32) -> Compute {
     let overrides = Overrides { size: Some(size), samples: Some(samples), ..Overrides::default() };
@@ -410,7 +404,8 @@ fn weak_regimes_have_warnings_and_others_none() {
 /// As `hd_4000` and `iris_pro` have them: the message says which option fits, and it does.
 #[test]
 fn groups_that_are_too_large_are_refused_with_what_fits() {
-    let compute = Some(ComputeSpec { group_lanes: 128, shared_bytes: 4096, ..COMPUTE });
+    let whole = hardware().compute.unwrap();
+    let compute = Some(ComputeSpec { group_lanes: 128, shared_bytes: 4096, ..whole });
     let small = PipelineSpec { compute, ..spec() };
     let drawn = |options: ComputeOptions| {
         let job = job(&options, (40, 24), 1);

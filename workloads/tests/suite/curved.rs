@@ -38,11 +38,11 @@ impl BallLens {
         let across = DVec3::new(0.0, libm::cos(angle), libm::sin(angle));
         let normal =
             (h * across - libm::sqrt(self.radius_m * self.radius_m - h * h) * DVec3::X) / self.radius_m;
-        let inside = refract(DVec3::X, normal, 1.0 / self.index)?;
+        let inside = refract(&Lane::default(), DVec3::X, normal, 1.0 / self.index)?;
         let entry = self.radius_m * normal;
         let from = entry - 2.0 * entry.dot(inside) * inside;
-        let along = refract(inside, -from / self.radius_m, self.index)?;
-        let enters = transmission(-normal.x, -inside.dot(normal), 1.0 / self.index);
+        let along = refract(&Lane::default(), inside, -from / self.radius_m, self.index)?;
+        let enters = transmission(&Lane::default(), [-normal.x, -inside.dot(normal)], 1.0 / self.index);
         Some(Ray { from, along, enters: enters * enters })
     }
 

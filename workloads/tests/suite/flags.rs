@@ -1,6 +1,6 @@
 //! Scene flags of workloads: used flags change the result, and others are refused.
 
-use crate::common::{drawn_on, expect, spec};
+use crate::common::{drawn_on, expect, hardware};
 use activity::Counts;
 use glam::Vec3;
 use workloads::catalog::find;
@@ -39,7 +39,7 @@ fn options(job: &str) -> OptionSource {
 /// Frame 1, in which moving objects have moved.
 fn drawn(job: &str, overrides: &Overrides) -> Result<(Vec<Vec3>, Counts), LoadError> {
     let job = find(job, &options(job), &JobRequest { overrides, seed: 1 }).unwrap()?;
-    let (drawn, report) = drawn_on(&spec(), &*job, 1);
+    let (drawn, report) = drawn_on(&hardware(), &*job, 1);
     Ok((drawn.image, report.counts()))
 }
 

@@ -264,7 +264,7 @@ fn passes_in_conservative_mode_are_on_heat_maps() {
         let settings = job.settings();
         let viewport = Viewport::new(settings.width, settings.height).unwrap();
         // Tiles of the GPU are not those of the passes.
-        let spec = PipelineSpec { tile_px: 4, ..crate::common::spec() };
+        let spec = PipelineSpec { tile_px: 4, ..crate::common::hardware() };
         let mut gpu = Gpu::without_packets(&spec).unwrap().with_heat(&events, viewport);
         job.frame(settings.frames.start, &mut gpu).unwrap();
         let report = gpu.finish();

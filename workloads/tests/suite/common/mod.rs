@@ -6,7 +6,7 @@ use std::path::PathBuf;
 
 use activity::Packet;
 use glam::Vec3;
-use pipeline::{FrameReport, Gpu, PipelineSpec};
+use pipeline::{ComputeSpec, FrameReport, Gpu, PipelineSpec};
 use serde_json::{Value, json};
 use workloads::LoadError;
 use workloads::job::{Drawn, Job};
@@ -173,6 +173,13 @@ pub fn spec() -> PipelineSpec {
         compute: None,
         warp_lanes: 32,
     }
+}
+
+/// The same with a compute unit.
+pub fn hardware() -> PipelineSpec {
+    let compute =
+        ComputeSpec { warp_lanes: 32, group_lanes: 256, shared_bytes: 32768, banks: 32, atomic_units: 1 };
+    PipelineSpec { compute: Some(compute), ..spec() }
 }
 
 /// The bits of an image.
