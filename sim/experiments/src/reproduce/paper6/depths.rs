@@ -76,14 +76,15 @@ impl Widths {
         [(steady.0 + turning.0) / (steady.1 + turning.1), turning.0 / turning.1, steady.0 / steady.1]
     }
 
+    /// Whether planes gain on the null, which has none, and most where the facing changes.
     fn holds(&self) -> bool {
-        let [all, turning, steady] = self.means(0);
+        let [all, turning, steady] = self.over_null();
         self.violations == 0 && all < 1.0 && turning < steady
     }
 
     /// Below 1 where the facing change is where planes gain most.
     fn number(&self) -> f64 {
-        let [_, turning, steady] = self.means(0);
+        let [_, turning, steady] = self.over_null();
         turning / steady
     }
 
@@ -108,8 +109,7 @@ impl Widths {
     }
 }
 
-/// Whether planes are narrower than the null, which has none: the vertices within the tile's own time. The
-/// condition of the row is about the vertices over the whole shutter, which that time alone beats.
+/// Whether planes are narrower than the null, which has none: the vertices within the tile's own time.
 #[derive(Default)]
 struct AgainstNull {
     /// How many cases there are.
@@ -231,7 +231,7 @@ pub(super) fn tighter(task: &Task<'_>) -> Result<Done, RunError> {
     Ok(Done { row: ClaimRow { numbers: facts, ran, note, ..made }, figures })
 }
 
-const OF: &str = "width where the facing changes over that elsewhere";
+const OF: &str = "width over that without planes where the facing changes, over the same elsewhere";
 const VARIED: &str = "mode and triangles jointly, in standard mode with tile_px";
 
 const fn mode_name(mode: Mode) -> &'static str {
@@ -607,14 +607,15 @@ mod tests {
         widths
     }
 
-    /// Narrower than the vertices over the whole shutter, with no gain by planes at all: the condition holds,
-    /// and the row says that no interval is narrower than that of the null.
+    /// Narrower than the vertices over the whole shutter, and most so where the facing changes, with no gain by
+    /// planes at all: the condition does not hold.
     #[test]
     fn planes_that_gain_nothing_are_not_narrower_than_the_null() {
         let idle = widths([1.0, 1.0, 1.0], [1.8, 1.8, 1.8]);
-        assert!(idle.holds() && idle.null() == [0.7, 0.5, 0.9]);
+        assert!(!idle.holds() && idle.means(0) == [0.7, 0.5, 0.9] && idle.number() == 1.0);
         assert_eq!(idle.over_null(), [1.0; 3]);
         let useful = widths([0.5, 0.5, 1.0], [1.8, 1.8, 1.8]);
+        assert!(useful.holds() && useful.number() == 0.5);
         let mut against = AgainstNull::default();
         against.add(&idle);
         assert_eq!((against.cases, against.narrower, against.turning_more), (1, [0, 0], 0));
