@@ -138,6 +138,8 @@ struct Data {
     name: String,
     region: MemoryRange,
     words: Arc<Vec<u32>>,
+    /// Whether it is a view of a surface that has other contents by now.
+    is_outdated: bool,
 }
 
 /// All buffers of a frame.
@@ -174,7 +176,7 @@ impl Buffers {
     /// Adds a buffer of `data` in `region`.
     pub fn add<T: Word>(&mut self, name: &str, region: MemoryRange, data: &[T]) -> Buffer<T> {
         let words = Arc::new(data.iter().map(|value| value.bits()).collect());
-        self.0.push(Data { name: name.to_owned(), region, words });
+        self.0.push(Data { name: name.to_owned(), region, words, is_outdated: false });
         let number = self.0.len() as u32 - 1;
         Buffer { number, words: data.len() as u32, region, of: PhantomData }
     }
@@ -205,6 +207,16 @@ impl Buffers {
     /// Whether the frame has the buffer of a binding.
     pub fn has(&self, binding: &BufferBinding) -> bool {
         self.0.get(binding.number as usize).is_some_and(|data| data.region == binding.region)
+    }
+
+    /// Lets no pass use the views of the surface in `region` any more.
+    pub fn outdate(&mut self, region: MemoryRange) {
+        let views = self.0.iter_mut().filter(|data| data.region == region);
+        views.for_each(|data| data.is_outdated = true);
+    }
+
+    pub fn is_outdated(&self, buffer: u32) -> bool {
+        self.0[buffer as usize].is_outdated
     }
 
     /// All words of a bound buffer as they are now.

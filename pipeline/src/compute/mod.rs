@@ -11,7 +11,8 @@
 //! - A group sees the buffers as they were before the pass. Stores and atomics of all groups take effect in
 //!   the order of the groups when the pass ends. So groups run in parallel, and results are the same for any
 //!   number of threads.
-//! - For the same reason no atomic on a buffer returns the word before it.
+//! - For the same reason no atomic on a buffer returns the word before it, and a group may not load a word that it
+//!   has written.
 //! - Caches see the lines in the order of the groups.
 //!
 //! Programs read surfaces through a [`SurfaceView`].
@@ -236,6 +237,16 @@ pub enum Fault {
         /// Words of the buffer.
         words: u32,
     },
+    /// A group loads a word that it has written, which the model does not see before the pass ends.
+    #[error(
+        "index {index} of buffer `{buffer}` is loaded after the group wrote it; load it in a later pass, or use shared memory"
+    )]
+    Written {
+        /// The buffer.
+        buffer: String,
+        /// The index.
+        index: u32,
+    },
     /// An index is beyond the shared memory.
     #[error("word {index} of the shared memory, which has {words}")]
     SharedRange {
@@ -454,9 +465,14 @@ impl State<'_> {
         let bound = self.access.get(buffer as usize).copied().flatten();
         let fault = match bound {
             Some(access) if kind == AccessKind::Load || access == Access::Write => {
-                let words = buffers.words(buffer);
-                let range = || Fault::Range { buffer: buffers.name(buffer).to_owned(), index, words };
-                (index >= words).then(range)
+                let (words, name) = (buffers.words(buffer), || buffers.name(buffer).to_owned());
+                if index >= words {
+                    Some(Fault::Range { buffer: name(), index, words })
+                } else if kind == AccessKind::Load && self.has_written(buffer, index) {
+                    Some(Fault::Written { buffer: name(), index })
+                } else {
+                    None
+                }
             }
             _ => Some(Fault::Binding(buffers.name(buffer).to_owned())),
         };
@@ -469,6 +485,12 @@ impl State<'_> {
             }
         }
         false
+    }
+
+    /// Whether the group wrote a word of a buffer. Few groups load buffers that they write.
+    fn has_written(&self, buffer: u32, index: u32) -> bool {
+        self.access[buffer as usize] == Some(Access::Write)
+            && self.log.stored.iter().any(|stored| (stored.buffer, stored.index) == (buffer, index))
     }
 
     fn note(&mut self, kind: AccessKind, buffer: u32, address: u64) {

@@ -240,6 +240,16 @@ pub enum PassError {
         /// Number of the buffer.
         number: u32,
     },
+    /// A view is of what a surface held before a later pass.
+    #[error(
+        "pass `{pass}`: a later pass replaced what the view of the surface `{surface}` shows; use a new one from `Gpu::surface_view`"
+    )]
+    OutdatedView {
+        /// The pass.
+        pass: String,
+        /// Name of the surface.
+        surface: String,
+    },
     /// The frame was stopped.
     #[error("pass `{pass}` is not drawn: the frame was stopped before it")]
     Stopped {

@@ -24,7 +24,7 @@ impl Gpu<'_> {
         self.buffers.add(name, region, data)
     }
 
-    /// What a pass stored in a surface; `None` while nothing is stored in it.
+    /// What a pass stored in a surface, until another one stores there; `None` while nothing is stored in it.
     pub fn surface_view(&mut self, id: SurfaceId) -> Option<SurfaceView> {
         let state = self.surfaces.get(id)?;
         let words = state.texels.as_ref()?.words(&state.layout, state.region.bytes() as usize / 4);
@@ -42,6 +42,7 @@ impl Gpu<'_> {
     /// # Errors
     /// [`PassError::Compute`] if the GPU has no compute unit, if groups are too large for it, or if the
     /// program does what it may not; [`PassError::Buffer`] if a buffer is of another frame;
+    /// [`PassError::OutdatedView`] if it is a view of what a surface no longer holds;
     /// [`PassError::Memory`] if the buffers of the frame are too large.
     pub fn dispatch(&mut self, pass: &ComputePass<'_>) -> Result<Counts, PassError> {
         let failed = |error| PassError::Compute { pass: pass.name.to_owned(), error };
@@ -68,16 +69,24 @@ impl Gpu<'_> {
         Ok(self.counts_of_pass())
     }
 
-    /// Checks that the frame has the bound buffers.
+    /// Checks that the frame has the bound buffers, and that views are of what surfaces hold.
     pub(super) fn check_buffers<'b>(
         &self,
         pass: &str,
         bindings: impl IntoIterator<Item = &'b BufferBinding>,
     ) -> Result<(), PassError> {
-        let missing = bindings.into_iter().find(|binding| !self.buffers.has(binding));
-        let refused =
-            |binding: &BufferBinding| PassError::Buffer { pass: pass.to_owned(), number: binding.number() };
-        missing.map_or(Ok(()), |binding| Err(refused(binding)))
+        let pass = || pass.to_owned();
+        for binding in bindings {
+            let number = binding.number();
+            if !self.buffers.has(binding) {
+                return Err(PassError::Buffer { pass: pass(), number });
+            }
+            if self.buffers.is_outdated(number) {
+                let surface = self.buffers.name(number).to_owned();
+                return Err(PassError::OutdatedView { pass: pass(), surface });
+            }
+        }
+        Ok(())
     }
 
     fn groups(

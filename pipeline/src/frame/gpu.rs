@@ -453,6 +453,7 @@ impl<'e> Gpu<'e> {
         let Some(state) = self.surfaces.get_mut(id) else { return };
         let (place, is_stored) = (state.region, texels.is_some());
         state.texels = texels.map(Arc::new);
+        self.buffers.outdate(place);
         // What was stored before is no longer a result either.
         self.results.retain(|result| *result != place);
         self.pending.retain(|result| *result != place);

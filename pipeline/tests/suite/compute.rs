@@ -370,6 +370,14 @@ fn faults_of_programs_name_group_lane_and_buffer() {
     );
     let race = "lane 1: word 0 of the shared memory is used by another lane";
     refused(fault(|lane, _| lane.set_shared(0, lane.index())), race);
+    let written = "lane 1: index 0 of buffer `data` is loaded after the group wrote it";
+    refused(
+        fault(|lane, data| {
+            lane.load(data, 0);
+            lane.store(data, 0, lane.index());
+        }),
+        written,
+    );
     let spec = hardware();
     let mut gpu = Gpu::without_packets(&spec).unwrap();
     let buffer = gpu.buffer("input", &[0_u32; 32]);
@@ -419,6 +427,7 @@ fn groups_read_a_surface_as_a_pass_stored_it() {
         assert_eq!(gpu.values(out), read);
         assert!(read.iter().any(|value| *value != read[0]));
     }
+    let before = gpu.surface_view(surfaces[0]).unwrap();
     gpu.draw(&raster).unwrap();
     let view = gpu.surface_view(surfaces[0]).unwrap();
     let outside = Program(|group: &mut Group<'_>| {
@@ -427,6 +436,11 @@ fn groups_read_a_surface_as_a_pass_stored_it() {
         });
     });
     assert!(gpu.dispatch(&pass(1, 1, &[view.reads()], &outside)).is_err());
+    let outdated = gpu.dispatch(&pass(1, 1, &[before.reads()], &outside)).unwrap_err();
+    assert!(
+        matches!(&outdated, PassError::OutdatedView { surface, .. } if surface == "surface"),
+        "{outdated}"
+    );
     drop(gpu);
     let waits = kinds.iter().filter(|(kind, _)| *kind == PacketKind::Barrier(Waits::Tiles));
     let waits: Vec<u32> = waits.map(|(_, pass)| *pass).collect();
