@@ -89,7 +89,7 @@ impl AddAssign<&Self> for PacketCounts {
 pub struct Packet {
     /// Kind of work.
     pub kind: PacketKind,
-    /// Pass number in the frame, from 0.
+    /// Pass number in the frame, from 0. What is written back when the frame ends has the number after the last.
     pub pass: u32,
     /// Batch of triangles in the pass, from 0. Tiles wait for the vertices of their batch, vertices for the
     /// tiles of the batch before the last.

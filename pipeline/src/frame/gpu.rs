@@ -503,8 +503,7 @@ impl<'e> Gpu<'e> {
     pub fn finish(mut self) -> FrameReport {
         let mut counts = PacketCounts::default();
         self.memory.finish(&self.results, &mut counts);
-        let (batch, pass) = (self.last_batch, self.last_pass());
-        let packet = Packet { batch, counts, ..Packet::new(PacketKind::Resolve, pass) };
+        let packet = Packet { counts, ..Packet::new(PacketKind::Resolve, self.passes.len() as u32) };
         (self.emit)(&packet, self.memory.log());
         self.heat.add(&packet, false);
         let mut write_back = Counts::default();

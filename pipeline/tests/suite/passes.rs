@@ -52,7 +52,11 @@ fn a_pass_has_the_image_that_it_has_alone() {
                 assert_eq!(report.passes[number].counts()[event], alone.counts[event], "{event:?}");
             }
         }
-        assert_eq!(packets.last().map(|packet| packet.pass), Some(1));
+        assert_eq!(
+            packets.last().map(|packet| packet.pass),
+            Some(2),
+            "the write-back comes after the last pass"
+        );
     });
 }
 

@@ -21,7 +21,7 @@ use workloads::job::{Drawn, Fact, ReadyFrame};
 use workloads::{Fingerprint, Job, Regime};
 
 use crate::heat::{self, HeatPicture};
-use crate::passes::{self, timed_j};
+use crate::passes::{self, WRITE_BACK, timed_j};
 use crate::{GpuSpec, Observed, Origin, Plan, RunError, RunFrame};
 
 /// Largest number of bins of all frames, at about 200 bytes each. Longer runs use longer bins.
@@ -236,10 +236,8 @@ pub struct JobFrame {
     pub report: FrameReport,
     /// Power over time.
     pub power: FramePower,
-    /// Passes of the frame, in order.
+    /// Passes of the frame, in order, and its write-back.
     pub passes: Vec<PassEnergy>,
-    /// Energy of writing results to memory when the frame ends, J.
-    pub write_back_j: f64,
 }
 
 /// Energy of a pass.
@@ -300,25 +298,26 @@ impl JobFrame {
         let power = model.frame(&timed.timeline);
         let power = power.map_err(|source| RunError::Timeline { frame: number, source })?;
         let mut before_s = 0.0;
-        let pass = |(pass, time): (&pipeline::PassReport, &timing::PassTime)| {
+        let pass = |((name, counts), time): ((&str, Counts), &timing::PassTime)| {
             let end_s = time.end_ps as f64 * S_PER_PS;
             let from_s = std::mem::replace(&mut before_s, end_s);
             PassEnergy {
-                name: pass.name.clone(),
+                name: name.to_owned(),
                 end_s,
                 time_s: end_s - from_s,
-                events_j: events_j(model, &pass.counts()),
+                events_j: events_j(model, &counts),
                 timed_j: timed_j(&power, from_s, end_s),
             }
         };
-        let passes = report.passes.iter().zip(&timed.passes).map(pass).collect();
-        let write_back_j = events_j(model, &report.write_back);
-        Ok(Self { drawn, report, power, passes, write_back_j })
+        let works = report.passes.iter().map(|pass| (pass.name.as_str(), pass.counts()));
+        let works = works.chain([(WRITE_BACK, report.write_back)]);
+        let passes = works.zip(&timed.passes).map(pass).collect();
+        Ok(Self { drawn, report, power, passes })
     }
 
-    /// Energy of all passes and of the write-back, J: to compare with that of the power over time.
+    /// Energy of all passes, J: to compare with that of the power over time.
     pub fn sum_j(&self) -> f64 {
-        self.passes.iter().map(PassEnergy::total_j).sum::<f64>() + self.write_back_j
+        self.passes.iter().map(PassEnergy::total_j).sum()
     }
 
     /// Bytes to and from memory.
@@ -412,14 +411,14 @@ mod tests {
             let job = Deferred::new(options, &overrides, 1).unwrap();
             let frame = JobFrame::new(&job, 0, &gpu, &model).unwrap();
             let names: Vec<&str> = frame.passes.iter().map(|pass| pass.name.as_str()).collect();
-            assert_eq!(names, ["g-buffer", "lighting", "resolve"]);
+            assert_eq!(names, ["g-buffer", "lighting", "resolve", WRITE_BACK]);
             let whole_j: f64 =
                 frame.power.bins().map(|(length_s, watts)| length_s * watts.iter().sum::<f64>()).sum();
             let error = (frame.sum_j() / whole_j - 1.0).abs();
             assert!(error < 1e-9, "{error:e}");
             // Each part is far above what would be missed.
-            let parts = frame.passes.iter().flat_map(|pass| [pass.events_j, pass.timed_j]);
-            assert!(parts.chain([frame.write_back_j]).all(|part_j| part_j > 1e-6 * whole_j));
+            let mut parts = frame.passes.iter().flat_map(|pass| [pass.events_j, pass.timed_j]);
+            assert!(parts.all(|part_j| part_j > 1e-6 * whole_j));
         }
     }
 

@@ -47,7 +47,7 @@ pub struct WorkSummary {
 }
 
 /// Name of the last row: results that are written to memory when a frame ends.
-const WRITE_BACK: &str = "write back";
+pub(crate) const WRITE_BACK: &str = "write back";
 /// Largest number of draws of a pass that are listed.
 const MAX_DRAWS: usize = 256;
 
@@ -78,8 +78,8 @@ pub fn passes_of<'a>(plan: &Plan, frames: impl Iterator<Item = &'a RunFrame>) ->
     let mut write_back = Spent::default();
     for frame in frames {
         let Some(observed) = frame.observed() else { continue };
-        write_back.counts += &observed.report.write_back;
-        add(&mut groups, &FrameWork::new(observed), |from_s, to_s| timed_j(&frame.power, from_s, to_s));
+        let timed_j = |from_s, to_s| timed_j(&frame.power, from_s, to_s);
+        add((&mut groups, &mut write_back), &FrameWork::new(observed), timed_j);
     }
     let mut rows: Vec<_> = groups.into_iter().map(|group| group.summary(&plan.model)).collect();
     let used = write_back.counts;
@@ -88,7 +88,7 @@ pub fn passes_of<'a>(plan: &Plan, frames: impl Iterator<Item = &'a RunFrame>) ->
     rows
 }
 
-/// What is known of the passes of a frame.
+/// What is known of the passes of a frame. The last of `times` is that of the write-back.
 struct FrameWork<'a> {
     report: &'a FrameReport,
     times: &'a [PassTime],
@@ -100,6 +100,13 @@ impl<'a> FrameWork<'a> {
     fn new(observed: &'a Observed) -> Self {
         let Observed { report, times, spans, stalls, .. } = observed;
         Self { report, times, spans, stalls: stalls.as_ref() }
+    }
+
+    /// Where pass `number` begins and ends: from the end of the pass before to its own.
+    fn span(&self, number: usize) -> [u64; 2] {
+        let end_of =
+            |number: usize| self.times.get(number).or(self.times.last()).map_or(0, |time| time.end_ps);
+        [number.checked_sub(1).map_or(0, end_of), end_of(number)]
     }
 
     /// Spans of a pass with their draws, if stalls are recorded.
@@ -125,7 +132,13 @@ struct Spent<'a> {
     stalled: Vec<StalledSpan<'a>>,
 }
 
-impl Spent<'_> {
+impl<'a> Spent<'a> {
+    /// Adds work between two times, with the energy besides its events.
+    fn add_span(&mut self, counts: &Counts, span: [u64; 2], others_w: f64, stalls: Option<&'a Stalls>) {
+        self.stalled.extend(stalls.map(|stalls| (stalls, span)));
+        self.add(counts, span[1] - span[0], others_w);
+    }
+
     fn add(&mut self, counts: &Counts, time_ps: u64, others_w: f64) {
         let time_s = seconds(time_ps);
         self.time_s += time_s;
@@ -162,31 +175,35 @@ fn seconds(time_ps: u64) -> f64 {
     time_ps as f64 * S_PER_PS
 }
 
-/// Adds the passes of a frame. `timed_j` is its energy besides the events, between two times. Draws that
-/// share the time of a pass share it by their times.
-fn add<'a>(groups: &mut Vec<Group<'a>>, frame: &FrameWork<'a>, timed_j: impl Fn(f64, f64) -> f64) {
-    let mut before_ps = 0;
+/// Adds the passes of a frame and its write-back. `timed_j` is its energy besides the events, between two times.
+/// Draws that share the time of a pass share it by their times.
+fn add<'a>(
+    (groups, write_back): (&mut Vec<Group<'a>>, &mut Spent<'a>),
+    frame: &FrameWork<'a>,
+    timed_j: impl Fn(f64, f64) -> f64,
+) {
+    let others_w = |[from_ps, to_ps]: [u64; 2]| {
+        let (from_s, to_s) = (seconds(from_ps), seconds(to_ps));
+        if to_s > from_s { timed_j(from_s, to_s) / (to_s - from_s) } else { 0.0 }
+    };
     for (number, pass) in frame.report.passes.iter().enumerate() {
         let place = groups.iter().position(|group| group.name == pass.name).unwrap_or_else(|| {
             groups.push(Group { name: pass.name.clone(), ..Group::default() });
             groups.len() - 1
         });
-        let time = frame.times.get(number);
-        let end_ps = time.map_or(before_ps, |time| time.end_ps);
-        let span = [std::mem::replace(&mut before_ps, end_ps), end_ps];
-        let pass_s = seconds(end_ps - span[0]);
-        let others_j = if pass_s > 0.0 { timed_j(seconds(span[0]), seconds(end_ps)) } else { 0.0 };
-        let others_w = if pass_s > 0.0 { others_j / pass_s } else { 0.0 };
+        let span = frame.span(number);
+        let others_w = others_w(span);
         let group = &mut groups[place];
         group.passes += 1;
-        group.all.stalled.extend(frame.stalls.map(|stalls| (stalls, span)));
-        group.all.add(&pass.counts(), end_ps - span[0], others_w);
+        group.all.add_span(&pass.counts(), span, others_w, frame.stalls);
         if pass.draws.len() > 1 {
-            let draws_ps = time.map_or(&[][..], |time| &time.draws_ps);
-            group.add_draws(pass, (draws_ps, end_ps - span[0]), others_w);
+            let draws_ps = frame.times.get(number).map_or(&[][..], |time| &time.draws_ps);
+            group.add_draws(pass, (draws_ps, span[1] - span[0]), others_w);
             frame.stalled(number).for_each(|(draw, span)| group.of_draw(draw).stalled.push(span));
         }
     }
+    let span = frame.span(frame.report.passes.len());
+    write_back.add_span(&frame.report.write_back, span, others_w(span), frame.stalls);
 }
 
 impl<'a> Group<'a> {
@@ -398,15 +415,24 @@ mod tests {
             busy_ps: [0; Unit::COUNT],
             draws_ps: draws_ps.to_vec(),
         };
-        let times = [time(0, 3_000_000, &[]), time(2_000_000, 5_000_000, &[500_000, 900_000])];
+        let times = [
+            time(0, 3_000_000, &[]),
+            time(2_000_000, 5_000_000, &[500_000, 900_000]),
+            time(4_000_000, 5_500_000, &[]),
+        ];
         let passes = vec![pass("map", vec![hits(5)]), pass("image", vec![hits(1), hits(2)])];
-        let report = FrameReport { passes, ..FrameReport::default() };
+        let report = FrameReport { passes, write_back: hits(7), ..FrameReport::default() };
         let frame = FrameWork { report: &report, times: &times, spans: &[], stalls: None };
-        (0..2).for_each(|_| add(&mut groups, &frame, |from_s, to_s| 2.0 * (to_s - from_s)));
+        let mut write_back = Spent::default();
+        (0..2).for_each(|_| {
+            add((&mut groups, &mut write_back), &frame, |from_s, to_s| 2.0 * (to_s - from_s));
+        });
         let found: Vec<_> = groups.iter().map(|group| (group.name.as_str(), group.passes)).collect();
         assert_eq!(found, [("map", 2), ("image", 2)]);
         let spent: Vec<_> = groups.iter().map(|group| (group.all.time_s, group.all.others_j)).collect();
         let near = |a: f64, b: f64| (a / b - 1.0).abs() < 1e-12;
+        assert!(near(write_back.time_s, 1e-6) && near(write_back.others_j, 2e-6));
+        assert_eq!(write_back.counts, hits(14));
         let expected = [(6e-6, 12e-6), (4e-6, 8e-6)];
         let close = |((time_s, joules), (of_s, of_j)): (&(f64, f64), (f64, f64))| {
             near(*time_s, of_s) && near(*joules, of_j)

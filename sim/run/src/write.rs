@@ -3,7 +3,6 @@
 use activity::{Packet, S_PER_PS, Unit};
 use output::dir::{Claim, OutDir, SUMMARY};
 use output::terminal::Progress;
-use pipeline::PassReport;
 use power_model::Part;
 use timing::{DrawSpan, PassTime};
 use traces::energy::{ExtraColumn, FrameEnergy, FrameTable, TOLERANCE_S, truth_beside};
@@ -13,7 +12,7 @@ use traces::io::perfetto::{
 
 use crate::frame::image_name;
 use crate::heat::heat_name;
-use crate::passes::{stall_tracks, take_turns};
+use crate::passes::{WRITE_BACK, stall_tracks, take_turns};
 use crate::{FIGURES, FinishedRun, FrameRow, Observed, Plan, RunError, report};
 
 /// Files that a run may write.
@@ -150,14 +149,15 @@ fn passes(observed: &Observed, start_s: f64, most: usize) -> Vec<PassSpan> {
     }
     let at = |ps: u64| ns(start_s + ps as f64 * S_PER_PS);
     let mut before_ps = 0;
-    let span = |((pass, time), number): ((&PassReport, &PassTime), u32)| {
+    let span = |((name, time), number): ((&str, &PassTime), u32)| {
         let start_ps = std::mem::replace(&mut before_ps, time.end_ps);
         let ends_ns = [start_ps, time.end_ps].map(at);
-        let name = pass.name.clone();
+        let name = name.to_owned();
         let parts = draws(observed, number, ends_ns, (at, most));
         PassSpan { name, start_ns: ends_ns[0], end_ns: ends_ns[1], parts }
     };
-    let spans = observed.report.passes.iter().zip(&observed.times).zip(0..).map(span);
+    let names = observed.report.passes.iter().map(|pass| pass.name.as_str()).chain([WRITE_BACK]);
+    let spans = names.zip(&observed.times).zip(0..).map(span);
     spans.filter(|span| span.start_ns < span.end_ns).collect()
 }
 
@@ -168,7 +168,7 @@ fn draws(
     [start_ns, end_ns]: [u64; 2],
     (at, most): (impl Fn(u64) -> u64, usize),
 ) -> Vec<PassSpan> {
-    let count = observed.report.passes[pass as usize].draws.len();
+    let count = observed.report.passes.get(pass as usize).map_or(0, |pass| pass.draws.len());
     if count < 2 || observed.times.iter().all(|time| time.draws_ps.is_empty()) {
         return Vec::new();
     }

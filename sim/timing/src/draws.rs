@@ -165,13 +165,13 @@ impl DrawTimes {
 pub struct PassTime {
     /// When its first packet starts.
     pub begin_ps: u64,
-    /// When its last packet leaves, and no earlier than the end of the pass before. That of the last pass is
-    /// the length of the frame, so the times between ends add up to the frame.
+    /// When its last packet leaves, and no earlier than the end of the pass before. That of the last one, which
+    /// writes results back to memory, is the length of the frame, so the times between ends add up to the frame.
     pub end_ps: u64,
     /// Time that its work takes each unit at its rates, all servers together. It is the same at all levels.
     pub busy_ps: [u64; Unit::COUNT],
     /// Time of each draw, by number: its part of the time from the end of the pass before to the end of this
-    /// one. What is missing is that of the resolve, the barrier and the last lines to memory.
+    /// one. What is missing is that of the resolve and the barrier.
     pub draws_ps: Vec<u64>,
 }
 

@@ -240,7 +240,7 @@ impl Bench<'_> {
             let whole = truth.curve.energy_j(paced.start_s, paced.end_s);
             split.frame += above(whole, paced.start_s, paced.end_s);
             // Between frames the machine draws idle power, and disturbances at any time.
-            split.rest += paced.extra_j + frame.write_back_j;
+            split.rest += paced.extra_j;
             for pass in &frame.passes {
                 let part = match pass.name.as_str() {
                     "g-buffer" => &mut split.g_buffer,
