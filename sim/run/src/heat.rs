@@ -142,7 +142,8 @@ impl Heat {
         LinearImage::new(plan.viewport.width(), plan.viewport.height(), &pixels)?
             .write_exr(dir, &format!("{name}.exr"))?;
         dir.write_file(&format!("{name}.csv"), |out| self.table(out))?;
-        let placed = if self.total > 0.0 { 1.0 - self.elsewhere / self.total } else { 0.0 };
+        // Of nothing, nothing is missing.
+        let placed = if self.total > 0.0 { 1.0 - self.elsewhere / self.total } else { 1.0 };
         Ok(HeatPicture { of: self.of, frame, placed, png })
     }
 
