@@ -22,10 +22,10 @@ impl SlotPorts {
         Self { slot, work: [0; CLIENTS.len()] }
     }
 
-    /// The part of `capacity` that a port can have: all have the same if more than one comes.
-    fn part(&self, port: usize, capacity: u64) -> u64 {
+    /// Number of ports that share the slot if `port` comes. All get the same part of it.
+    fn sharing(&self, port: usize) -> u64 {
         let others = self.work.iter().enumerate().filter(|(other, work)| *other != port && **work > 0);
-        capacity / (1 + others.count() as u64)
+        1 + others.count() as u64
     }
 
     /// Takes up to `wanted` from the other ports that have most, and leaves each at least `part`. Returns how
@@ -46,6 +46,16 @@ impl SlotPorts {
         }
         taken
     }
+}
+
+/// What a port has of a slot.
+struct Shared {
+    /// Its work in the slot.
+    here: u64,
+    /// Work of other ports that made room for it.
+    moved: u64,
+    /// Ports that take turns in the slot.
+    ports: u64,
 }
 
 /// Work of a port that made room for others and waits in the queue of the port, which stays in order: all
@@ -107,10 +117,10 @@ impl Arbiter {
 
     /// Reserve `work` for a port from `at` on. Returns when it begins and ends.
     pub fn reserve_as(&mut self, turn: Turn, port: usize, at: Time, work: u64) -> (Time, Time) {
-        if turn == Turn::Late {
+        let first = self.calendar.slot_of(at);
+        if turn == Turn::Late && self.has_forgotten(first) {
             return self.calendar.reserve_as(turn, at, work);
         }
-        let first = self.calendar.slot_of(at);
         if self.calendar.free(first) >= work {
             self.ports(first).work[port] += work;
             return self.calendar.reserve(at, work);
@@ -119,10 +129,13 @@ impl Arbiter {
         loop {
             self.calendar.reach(slot);
             let before = self.calendar.end_of_slot_work(slot, at);
-            let (here, moved) = self.share(slot, port, remaining);
+            let Shared { here, moved, ports } = self.share(slot, port, remaining);
             let (from, end) = match moved {
                 0 => (before, self.calendar.end_of_slot_work(slot, at)),
-                _ => (self.calendar.start_of(slot).max(at), self.calendar.start_of(slot + 1)),
+                _ => {
+                    let [from, next] = [slot, slot + 1].map(|slot| self.calendar.start_of(slot).max(at));
+                    (from, next.min(from + self.calendar.time_of(here * ports)))
+                }
             };
             if here > 0 {
                 begin.get_or_insert(from);
@@ -136,13 +149,13 @@ impl Arbiter {
         }
     }
 
-    /// Give a port as much of a slot as is free, or its part of it, up to `wanted`. Returns how much it has,
-    /// and how much of others made room.
-    fn share(&mut self, slot: usize, port: usize, wanted: u64) -> (u64, u64) {
+    /// Give a port as much of a slot as is free, or its part of it, up to `wanted`.
+    fn share(&mut self, slot: usize, port: usize, wanted: u64) -> Shared {
         let free = self.calendar.free(slot).min(wanted);
         let capacity = self.calendar.capacity();
         let ports = self.ports(slot);
-        let part = ports.part(port, capacity);
+        let count = ports.sharing(port);
+        let part = capacity / count;
         let more = part.saturating_sub(ports.work[port]).min(wanted).saturating_sub(free);
         let taken = ports.take(port, more, part);
         let moved = taken.iter().sum();
@@ -150,13 +163,31 @@ impl Arbiter {
         if free > 0 {
             self.calendar.reserve(self.calendar.start_of(slot), free);
         }
-        if moved > 0 {
-            let end = self.calendar.reserve(self.calendar.start_of(slot + 1), moved).1;
-            for (lag, work) in self.lags.iter_mut().zip(taken).filter(|(_, work)| *work > 0) {
-                lag.add(self.calendar.start_of(slot), end, work, self.room);
+        for (port, work) in taken.into_iter().enumerate().filter(|(_, work)| *work > 0) {
+            let end = self.append(port, slot + 1, work);
+            self.lags[port].add(self.calendar.start_of(slot), end, work, self.room);
+        }
+        Shared { here: free + moved, moved, ports: count }
+    }
+
+    /// Whether the ports of a slot are no longer known.
+    fn has_forgotten(&self, slot: usize) -> bool {
+        self.slots[slot % REMEMBERED_SLOTS].slot > slot
+    }
+
+    /// Give a port free capacity of a slot and those after it. Returns when its work ends.
+    fn append(&mut self, port: usize, first: usize, work: u64) -> Time {
+        let (mut slot, mut remaining) = (first, work);
+        loop {
+            slot = self.calendar.find_free(slot);
+            let here = self.calendar.free(slot).min(remaining);
+            let end = self.calendar.reserve(self.calendar.start_of(slot), here).1;
+            self.ports(slot).work[port] += here;
+            remaining -= here;
+            if remaining == 0 {
+                return end;
             }
         }
-        (free + moved, moved)
     }
 
     fn ports(&mut self, slot: usize) -> &mut SlotPorts {
@@ -200,11 +231,32 @@ mod tests {
         // Half of a slot that the other port had; four lines of that move on.
         assert_eq!(ports.reserve_as(Turn::InOrder, 1, 0, 4), (0, 8));
         assert_eq!(used(&ports), [(0, 8), (8, 8), (16, 4)]);
-        // Its part of the first slot is used up. The next slots have half for each.
-        assert_eq!(ports.reserve_as(Turn::InOrder, 1, 0, 2), (8, 16));
+        // Its part of the first slot is used up. The next slots have half for each, one line after the other.
+        assert_eq!(ports.reserve_as(Turn::InOrder, 1, 0, 2), (8, 12));
         // A third port has its part, which those with more give.
-        assert_eq!(ports.reserve_as(Turn::InOrder, 2, 0, 3), (0, 16));
+        assert_eq!(ports.reserve_as(Turn::InOrder, 2, 0, 3), (0, 11));
         assert_eq!(used(&ports).iter().map(|(_, work)| work).sum::<u64>(), 16 + 4 + 2 + 3);
+    }
+
+    #[test]
+    fn lines_that_made_room_make_room_again() {
+        let mut ports = arbiter();
+        ports.reserve_as(Turn::Late, 0, 0, 24);
+        // Four lines of each slot, which move on to the end and lie in the way of the last of these.
+        for slot in 0..3 {
+            assert_eq!(ports.reserve_as(Turn::InOrder, 3, 8 * slot, 4), (8 * slot, 8 * slot + 8));
+        }
+        assert_eq!(used(&ports), [(0, 8), (8, 8), (16, 8), (24, 8), (32, 4)]);
+        assert_eq!(ports.reserve_as(Turn::InOrder, 3, 24, 4), (24, 32));
+    }
+
+    #[test]
+    fn late_lines_share_what_is_too_long_ago_to_know_its_ports() {
+        let mut ports = arbiter();
+        ports.reserve_as(Turn::InOrder, 3, 0, 8);
+        ports.reserve_as(Turn::InOrder, 3, 8 * REMEMBERED_SLOTS as Time, 8);
+        assert_eq!(ports.reserve_as(Turn::Late, 0, 0, 4), (0, 8));
+        assert_eq!(ports.calendar.yielded(), 12);
     }
 
     #[test]

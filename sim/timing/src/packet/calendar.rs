@@ -201,7 +201,8 @@ impl Calendar {
         if self.servers == 1 { work } else { work / self.servers }
     }
 
-    fn find_free(&mut self, from: usize) -> usize {
+    /// The first slot from `from` on with free capacity.
+    pub fn find_free(&mut self, from: usize) -> usize {
         self.reach(from);
         let mut at = from;
         while self.next_free[at] as usize != at {
