@@ -107,8 +107,11 @@ impl Stage {
             (Some(_), Some(by)) => Reason::Blocked(by),
             _ => Reason::Idle,
         };
-        let requests = has_requests && self.requested_at(now) > 0;
-        Ticked { acted, busy: if works_on || requests { CYCLE } else { self.server.used_at(now) }, reason }
+        Ticked {
+            acted,
+            busy: if works_on { CYCLE } else { self.server.used_at(now).max(self.requests_at(now)) },
+            reason,
+        }
     }
 
     /// Whether it serves no packet. The caller then knows why.
@@ -119,6 +122,11 @@ impl Stage {
     /// Lines requested in the cycle that begins at `now`.
     fn requested_at(&self, now: Time) -> u32 {
         if self.last_requests.0 == now { self.last_requests.1 } else { 0 }
+    }
+
+    /// The part of the cycle at `now` that its requests take at their rate.
+    fn requests_at(&self, now: Time) -> Work {
+        CYCLE * Work::from(self.requested_at(now)) / Work::from(self.lines_per_cycle.max(1))
     }
 
     /// Request one line.
