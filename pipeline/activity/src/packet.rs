@@ -27,6 +27,13 @@ pub enum PacketKind {
     Barrier(Waits),
 }
 
+impl PacketKind {
+    /// Whether the front end works on it, from the fetch of vertices to set-up.
+    pub const fn is_of_front_end(self) -> bool {
+        matches!(self, Self::Draw | Self::Vertices)
+    }
+}
+
 /// Packets that wait at a barrier.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Waits {

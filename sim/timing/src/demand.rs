@@ -217,7 +217,7 @@ impl DemandBuilder {
         store: &mut Vec<LineAccess>,
     ) -> ServiceDemand {
         let counts = &packet.counts;
-        let front = matches!(packet.kind, PacketKind::Draw | PacketKind::Vertices);
+        let front = packet.kind.is_of_front_end();
         let barrier = match packet.kind {
             PacketKind::Barrier(waits) => Some(waits),
             _ => None,

@@ -49,7 +49,7 @@ use packet::MAX_CYCLES;
 use stepped::{Stalled, StepOptions, Stream};
 
 pub use bound::{BoundClock, Totals, bound};
-pub use check::{Checked, CheckedClock, Slices, error_size};
+pub use check::{Checked, CheckedClock, SliceWriter, Slices, error_size};
 pub use clock::{Clocks, Time};
 pub use demand::{CLIENTS, CYCLE, DemandBuilder, ServiceDemand, Station, Work};
 pub use draws::{DrawSpan, PassTime};

@@ -8,7 +8,7 @@ use activity::{PacketBuffer, PacketStream, StreamError, StreamWriter};
 use output::terminal::Progress;
 use power_model::PowerModel;
 use rayon::prelude::*;
-use timing::{FrameClock, Recorder, Slices, Timed};
+use timing::{FrameClock, Recorder, SliceWriter, Slices, Timed};
 
 pub use file::RecordedRun;
 
@@ -91,7 +91,7 @@ const PACKETS_IN_TURN: usize = 256;
 
 /// Sends all packets to each of the clocks. Returns slices of them, for a check of all.
 fn push_all(stream: &PacketStream, clocks: &mut [FrameClock<'_>]) -> Result<Slices, StreamError> {
-    let (mut buffer, mut slices) = (PacketBuffer::default(), Slices::default());
+    let (mut buffer, mut slices) = (PacketBuffer::default(), SliceWriter::default());
     stream.replay(|packet, lines| {
         buffer.push(packet, lines);
         slices.push(packet, lines);
@@ -101,7 +101,7 @@ fn push_all(stream: &PacketStream, clocks: &mut [FrameClock<'_>]) -> Result<Slic
         }
     })?;
     clocks.iter_mut().for_each(|clock| clock.push_all(&buffer));
-    Ok(slices)
+    Ok(slices.finish())
 }
 
 /// Frames of a recording with their times on a machine.

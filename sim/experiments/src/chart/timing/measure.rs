@@ -10,8 +10,8 @@ use run::{GpuSpec, RunError, cheapest_level};
 use serde::Serialize;
 use timing::stepped::{self, StepOptions, Stream};
 use timing::{
-    Checked, CheckedClock, Clocks, DemandBuilder, Level, PacketClock, Recorder, Slices, Timed, TimingError,
-    Totals, bound, streams,
+    Checked, CheckedClock, Clocks, DemandBuilder, Level, PacketClock, Recorder, SliceWriter, Slices, Timed,
+    TimingError, Totals, bound, streams,
 };
 
 use super::Reference;
@@ -162,9 +162,9 @@ impl Written {
             stream.add_last(&builder, &mut totals);
         }
         let cpu_s = started.elapsed().as_secs_f64();
-        let mut slices = Slices::default();
+        let mut slices = SliceWriter::default();
         packets.iter().for_each(|(packet, lines)| slices.push(packet, lines));
-        Ok(Self { clocks, builder, stream, totals, slices, cpu_s })
+        Ok(Self { clocks, builder, stream, totals, slices: slices.finish(), cpu_s })
     }
 
     /// The check of a level by which the frame takes so many cycles.
