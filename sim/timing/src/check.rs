@@ -419,7 +419,7 @@ mod tests {
 
     #[test]
     fn the_front_end_of_a_batch_is_beside_tiles_of_the_one_before() {
-        let packet = |kind, batch| Packet { batch, ..Packet::new(kind, 0) };
+        let packet = |kind, batch| Packet { kind, batch, ..packet() };
         let batches =
             [0, 1, 2].map(|batch| [PacketKind::Vertices, PacketKind::Tile].map(|kind| packet(kind, batch)));
         let [[v0, t0], [v1, t1], [v2, t2]] = batches;
@@ -441,7 +441,7 @@ mod tests {
         let (_, all) = broken(&units, "one giant triangle");
         let checked = |batch| {
             let mut slices = SliceWriter::default();
-            slices.push(&Packet { batch, ..Packet::new(PacketKind::Vertices, 0) }, &[]);
+            slices.push(&Packet { kind: PacketKind::Vertices, batch, ..packet() }, &[]);
             all.iter().for_each(|(packet, lines)| slices.push(packet, lines));
             let found = slices.finish().check(Level::Packet, machine(&units), 1000).unwrap();
             found.packets == found.of
