@@ -263,9 +263,16 @@ fn promise(line: &str) -> Option<(&str, &str)> {
 
 #[test]
 fn a_heat_map_of_work_outside_the_image() {
-    let heat = ["--set", "resolution=8", "--heat", "samples_tested"];
-    let results = quintile().run("ccd", &heat);
+    let run = |workload, args: &[&str]| {
+        quintile().run(workload, &[args, &["--frames", "0..1", "--heat", "samples_tested"]].concat())
+    };
+    let results = run("soft-shadows", &["--size", "32x18", "--set", "map_px=128"]);
     assert_warns(&results, "heat-outside-image");
+    let results = run("ccd", &["--set", "resolution=8"]);
+    assert!(
+        !results.warning_codes().contains(&"heat-outside-image".to_owned()),
+        "of no samples none is outside"
+    );
     assert!(
         !results.warning_codes().contains(&"empty-frame".to_owned()),
         "conservative passes are no empty frames"
