@@ -43,7 +43,7 @@ impl BeamBuffer {
     }
 }
 
-/// Makes the beams of `ocean` at a time in seconds.
+/// Makes the beams of `ocean` at a time in seconds. Without a compute unit they are in memory already.
 ///
 /// # Errors
 /// [`PassError`] if the GPU does not take the passes.
@@ -54,6 +54,10 @@ pub(super) fn refract_on(
     method: BeamMethod,
 ) -> Result<(Vec<Beam>, BeamBuffer), PassError> {
     let (side, beams) = (ocean.cells + 1, ocean.beams(time_s));
+    if gpu.spec().compute.is_none() {
+        let buffer = BeamBuffer::new(gpu, beams.len(), method);
+        return Ok((beams, buffer));
+    }
     let each = if ocean.pleat == 0.0 { 7 } else { 10 };
     let corners = gpu.buffer("corners", &vec![0.0_f32; (side * side * each) as usize]);
     let buffer = BeamBuffer::new(gpu, beams.len(), method);

@@ -1,8 +1,9 @@
 //! Scene flags of workloads: used flags change the result, and others are refused.
 
-use crate::common::{drawn_on, expect, hardware};
-use activity::Counts;
+use crate::common::{drawn_on, expect, hardware, spec};
+use activity::{Counts, Event};
 use glam::Vec3;
+use pipeline::PipelineSpec;
 use workloads::catalog::find;
 use workloads::job::{JobRequest, OptionSource};
 use workloads::{LoadError, Overrides};
@@ -38,8 +39,12 @@ fn options(job: &str) -> OptionSource {
 
 /// Frame 1, in which moving objects have moved.
 fn drawn(job: &str, overrides: &Overrides) -> Result<(Vec<Vec3>, Counts), LoadError> {
+    drawn_by(&hardware(), job, overrides)
+}
+
+fn drawn_by(spec: &PipelineSpec, job: &str, overrides: &Overrides) -> Result<(Vec<Vec3>, Counts), LoadError> {
     let job = find(job, &options(job), &JobRequest { overrides, seed: 1 }).unwrap()?;
-    let (drawn, report) = drawn_on(&hardware(), &*job, 1);
+    let (drawn, report) = drawn_on(spec, &*job, 1);
     Ok((drawn.image, report.counts()))
 }
 
@@ -122,4 +127,12 @@ fn what_draws_no_samples_of_a_table_names_none() {
         find(job, &options(job), &request).unwrap().unwrap().settings().table.clone()
     };
     assert_eq!(["caustics", "ccd", "occlusion"].map(table), ["none", "none", "owen"]);
+}
+
+#[test]
+fn caustics_need_no_compute_unit() {
+    let overrides = Overrides { size: Some((32, 18)), ..Overrides::default() };
+    let [with, without] = [hardware(), spec()].map(|spec| drawn_by(&spec, "caustics", &overrides).unwrap());
+    assert_eq!(with.0, without.0);
+    assert!(with.1[Event::Groups] > 0 && without.1[Event::Groups] == 0);
 }
