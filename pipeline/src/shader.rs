@@ -143,7 +143,7 @@ impl Lines {
     /// The lines as the texture cache sees them: those of fetches, then those of loads. The n-th loads of the
     /// lanes are one access, which reads a line once.
     pub fn accessed(mut self) -> impl Iterator<Item = u64> {
-        // Those of a lane are in order, which this sort merges.
+        // The loads of each lane are sorted already, and a stable sort merges such runs.
         self.loaded.sort();
         self.loaded.dedup();
         self.fetched.into_iter().chain(self.loaded.into_iter().map(|(_, line)| line))

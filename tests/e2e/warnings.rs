@@ -271,7 +271,7 @@ fn a_heat_map_of_work_outside_the_image() {
     let results = run("ccd", &["--set", "resolution=8"]);
     assert!(
         !results.warning_codes().contains(&"heat-outside-image".to_owned()),
-        "of no samples none is outside"
+        "a quantity that is 0 has no part outside the image"
     );
     assert!(
         !results.warning_codes().contains(&"empty-frame".to_owned()),

@@ -142,7 +142,7 @@ impl Heat {
         LinearImage::new(plan.viewport.width(), plan.viewport.height(), &pixels)?
             .write_exr(dir, &format!("{name}.exr"))?;
         dir.write_file(&format!("{name}.csv"), |out| self.table(out))?;
-        // Of nothing, nothing is missing.
+        // A quantity that is 0 has no part outside the image.
         let placed = if self.total > 0.0 { 1.0 - self.elsewhere / self.total } else { 1.0 };
         Ok(HeatPicture { of: self.of, frame, placed, png })
     }

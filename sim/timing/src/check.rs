@@ -10,7 +10,7 @@
 
 use std::collections::VecDeque;
 
-use activity::{LineAccess, Packet, PacketBuffer};
+use activity::{LineAccess, Packet, PacketBuffer, PacketKind};
 use warnings::{Code, Warning};
 
 use crate::{FrameClock, Level, Machine, Recorder, Timed, TimingError};
@@ -216,7 +216,9 @@ impl SliceWriter {
         self.beside += weight((packet, lines));
         while let Some((front, fetched)) = self.ahead.front() {
             let own = FRONT_END_FACTOR * weight((front, fetched));
-            let is_needed = front.pass < packet.pass || front.batch <= packet.batch;
+            let is_needed = front.pass < packet.pass
+                || front.batch <= packet.batch
+                || matches!(packet.kind, PacketKind::Barrier(_));
             if !is_needed && own > self.beside {
                 break;
             }
@@ -307,7 +309,7 @@ impl Slices {
         let kept: usize = self.parts.iter().map(PacketBuffer::len).sum();
         let cycles = of_frame as f64 * kept as f64 / self.packets.max(1) as f64;
         let mut found = compare(&self.slices(cycles))?;
-        // Slices are too short for queues to fill by batches side by side.
+        // Slices are too short to fill the queues in which overlapping batches wait for each other.
         let may_be_off = self.batches_overlap || found.error.abs() >= LARGE_ERROR;
         if found.packets < kept && may_be_off && cycles <= most {
             found = compare(&self.all())?;
@@ -373,7 +375,7 @@ impl Slices {
 
 #[cfg(test)]
 mod tests {
-    use activity::{LineKind, PacketKind, Unit};
+    use activity::{LineKind, Unit, Waits};
 
     use super::*;
 
@@ -433,6 +435,14 @@ mod tests {
         }
         let order: Vec<_> = slices.finish().parts[0].iter().map(|(packet, _)| *packet).collect();
         assert_eq!(order, [v0, t0, v1, t0, t0, v1, t0, t0, t1, v2, t1, v2, t2, v2]);
+        // A batch without tiles comes before the barrier that follows it.
+        let barrier = packet(PacketKind::Barrier(Waits::All), 0);
+        let mut slices = SliceWriter::default();
+        [v0, t0, v1, barrier].iter().for_each(|packet| slices.push(packet, &[]));
+        assert_eq!(
+            slices.finish().parts[0].iter().map(|(packet, _)| *packet).collect::<Vec<_>>(),
+            [v0, t0, v1, barrier]
+        );
     }
 
     #[test]

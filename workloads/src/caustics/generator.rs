@@ -106,7 +106,11 @@ impl Ocean {
 
     /// One beam per generator triangle, at a time in seconds.
     pub fn beams(&self, time_s: f64) -> Vec<Beam> {
-        let corners = self.corners(time_s);
+        self.beams_of(&self.corners(time_s))
+    }
+
+    /// One beam per generator triangle, from the corners of all.
+    pub(super) fn beams_of(&self, corners: &[Corner]) -> Vec<Beam> {
         let of_row = |row| (0..2 * self.cells).map(move |number| [number, row]);
         let all = (0..self.cells).flat_map(of_row);
         all.map(|at| {

@@ -53,21 +53,22 @@ pub(super) fn refract_on(
     time_s: f64,
     method: BeamMethod,
 ) -> Result<(Vec<Beam>, BeamBuffer), PassError> {
-    let (side, beams) = (ocean.cells + 1, ocean.beams(time_s));
+    let (side, corners) = (ocean.cells + 1, ocean.corners(time_s));
+    let beams = ocean.beams_of(&corners);
     if gpu.spec().compute.is_none() {
         let buffer = BeamBuffer::new(gpu, beams.len(), method);
         return Ok((beams, buffer));
     }
     let each = if ocean.pleat == 0.0 { 7 } else { 10 };
-    let corners = gpu.buffer("corners", &vec![0.0_f32; (side * side * each) as usize]);
+    let words = gpu.buffer("corners", &vec![0.0_f32; (side * side * each) as usize]);
     let buffer = BeamBuffer::new(gpu, beams.len(), method);
-    let stored = StoredCorners { words: corners, each };
+    let stored = StoredCorners { words, each };
     gpu.dispatch(&ComputePass {
         name: "refraction",
         groups: [side.div_ceil(GROUP_LANES), side, 1],
         group_size: GROUP_LANES,
         shared_bytes: 0,
-        bindings: &[corners.writes()],
+        bindings: &[words.writes()],
         shader: &Refraction { ocean, stored, time_s },
     })?;
     gpu.dispatch(&ComputePass {
@@ -75,8 +76,8 @@ pub(super) fn refract_on(
         groups: [(2 * ocean.cells).div_ceil(GROUP_LANES), ocean.cells, 1],
         group_size: GROUP_LANES,
         shared_bytes: 0,
-        bindings: &[corners.reads(), buffer.words.writes()],
-        shader: &Joining { ocean, stored, corners: &ocean.corners(time_s), buffer },
+        bindings: &[words.reads(), buffer.words.writes()],
+        shader: &Joining { ocean, stored, corners: &corners, buffer },
     })?;
     gpu.wait();
     Ok((beams, buffer))

@@ -239,19 +239,20 @@ mod tests {
     }
 
     #[test]
-    fn lines_that_made_room_make_room_again() {
+    fn moved_lines_keep_their_port() {
         let mut ports = arbiter();
         ports.reserve_as(Turn::Late, 0, 0, 24);
-        // Four lines of each slot, which move on to the end and lie in the way of the last of these.
+        // Half of each slot; four lines of the other port move to the next free slot each time.
         for slot in 0..3 {
             assert_eq!(ports.reserve_as(Turn::InOrder, 3, 8 * slot, 4), (8 * slot, 8 * slot + 8));
         }
         assert_eq!(used(&ports), [(0, 8), (8, 8), (16, 8), (24, 8), (32, 4)]);
+        // So there they give half of it again.
         assert_eq!(ports.reserve_as(Turn::InOrder, 3, 24, 4), (24, 32));
     }
 
     #[test]
-    fn late_lines_share_what_is_too_long_ago_to_know_its_ports() {
+    fn late_lines_get_half_of_slots_whose_ports_are_forgotten() {
         let mut ports = arbiter();
         ports.reserve_as(Turn::InOrder, 3, 0, 8);
         ports.reserve_as(Turn::InOrder, 3, 8 * REMEMBERED_SLOTS as Time, 8);
