@@ -7,7 +7,7 @@ use super::calendar::{Calendar, QueueTimes};
 use super::memory::Memory;
 use super::residents::Residents;
 use super::slots::{Occupancy, Slots, Turns};
-use super::station::{Service, aligned};
+use super::station::{ClientWork, Service, aligned};
 use super::{Span, Visit};
 use crate::clock::{Clocks, Time};
 use crate::demand::{CYCLE, DemandBuilder, Server, ServiceDemand, Station, WarpKind, Work, share, time_of};
@@ -80,6 +80,7 @@ struct DataState {
     unit: DataUnit,
     period: Time,
     latency: Time,
+    client: ClientWork,
     free: Time,
     departed: Time,
     server: Server,
@@ -95,6 +96,7 @@ impl DataState {
             unit,
             period,
             latency: period * Time::from(common.latency_cycles),
+            client: ClientWork::new(common.lines_per_cycle),
             free: 0,
             departed: 0,
             server: Server::default(),
@@ -312,11 +314,13 @@ impl Cores {
         let part = |part: u32| share(all.len() as u32, part, chunk.of).start as usize;
         let base = all.start - demand.first_line;
         let range = base + part(chunk.first)..base + part(chunk.first + chunk.count);
-        let mut arrived = 0;
+        let lines = range.len() as u32;
+        let (mut arrived, mut last_request) = (0, service.to);
         if !range.is_empty() {
             let fetched = memory.request(unit.port(), &visit.lines[range], visit.turn, start);
             served = served.max(fetched.last_request);
             arrived = fetched.arrived;
+            last_request = fetched.last_request;
             run.memory = run.memory.with(fetched.first, fetched.moved);
         }
         served = served.max(state.behind.room_for(chunk.count));
@@ -328,7 +332,7 @@ impl Cores {
         let first =
             (start + each).max(departed.saturating_sub(served.saturating_sub(start + each))).min(departed);
         state.behind.note_all(chunk.count, first, departed);
-        run.note_data(service);
+        run.note_data(state.client.with_requests(service, lines, last_request));
         Span { from: first + state.latency, to: departed + state.latency }
     }
 

@@ -26,6 +26,13 @@ pub(super) struct Fetched {
     pub moved: Time,
 }
 
+impl Fetched {
+    /// Before the first of requests that begin at `start`.
+    pub const fn none(start: Time) -> Self {
+        Self { last_request: start, first: Time::MAX, last: 0, arrived: 0, moved: 0 }
+    }
+}
+
 /// Consecutive lines with the same route.
 #[derive(Clone, Copy, Debug)]
 struct Run<'a> {
@@ -125,33 +132,50 @@ impl Memory {
 
     /// Request `lines` one after another from `start` on, and after those before them.
     pub fn request(&mut self, port: usize, lines: &[LineAccess], turn: Turn, start: Time) -> Fetched {
-        let mut fetched = Fetched { last_request: start, first: Time::MAX, last: 0, arrived: 0, moved: 0 };
+        let mut fetched = Fetched::none(start);
+        let mut remaining = lines;
+        while !remaining.is_empty() {
+            let count = self.request_run(port, remaining, turn, &mut fetched);
+            remaining = &remaining[count..];
+        }
+        fetched
+    }
+
+    /// When the L2 accepts the next request of a port at the earliest.
+    pub fn next_accepted(&self, port: usize) -> Time {
+        self.pacers[port].at.max(self.order[port])
+    }
+
+    /// Request those of `lines`, of which there are some, that go one way. Returns how many.
+    pub fn request_run(
+        &mut self,
+        port: usize,
+        lines: &[LineAccess],
+        turn: Turn,
+        fetched: &mut Fetched,
+    ) -> usize {
         let mut pacer = self.pacers[port];
         pacer.at += self.l2.stalled(port);
-        pacer.delay_until(start);
-        let mut remaining = lines;
-        while let Some(head) = remaining.first() {
-            // A run fits into the port's queue.
-            let max_count = remaining.len().min(self.queue as usize);
-            let count = self.on_one_route(&remaining[..max_count]);
-            remaining = &remaining[count as usize..];
-            // The queue of the port has room one cycle after the L2 accepts an earlier request.
-            let queue = &self.ports[port];
-            pacer.delay_until(
-                queue.room_at().max(queue.room_for(count).saturating_sub(pacer.delay_of_last(count))),
-            );
-            let run = Run { head, count, turn, last: pacer.delay_of_last(count) };
-            fetched.last_request = pacer.at + run.last;
-            let seen = (pacer.at + pacer.period).max(self.order[port]);
-            let (first, last) = self.take(port, &run, seen, &mut fetched);
-            self.order[port] = last;
-            self.ports[port].note_all(run.count, first + self.period, last + self.period);
-            fetched.first = fetched.first.min(first);
-            fetched.last = last;
-            pacer.advance(count, fetched.last_request);
-        }
+        pacer.delay_until(fetched.last_request);
+        // A run fits into the port's queue.
+        let max_count = lines.len().min(self.queue as usize);
+        let count = self.on_one_route(&lines[..max_count]);
+        // The queue of the port has room one cycle after the L2 accepts an earlier request.
+        let queue = &self.ports[port];
+        pacer.delay_until(
+            queue.room_at().max(queue.room_for(count).saturating_sub(pacer.delay_of_last(count))),
+        );
+        let run = Run { head: &lines[0], count, turn, last: pacer.delay_of_last(count) };
+        fetched.last_request = pacer.at + run.last;
+        let seen = (pacer.at + pacer.period).max(self.order[port]);
+        let (first, last) = self.take(port, &run, seen, fetched);
+        self.order[port] = last;
+        self.ports[port].note_all(run.count, first + self.period, last + self.period);
+        fetched.first = fetched.first.min(first);
+        fetched.last = last;
+        pacer.advance(count, fetched.last_request);
         self.pacers[port] = pacer;
-        fetched
+        count as usize
     }
 
     /// Number of lines from the first of `lines` on that take its route.

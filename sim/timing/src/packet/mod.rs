@@ -44,12 +44,12 @@ use std::collections::VecDeque;
 use activity::{LineAccess, Packet, PacketCounts, Unit, Waits};
 use calendar::Turn;
 use cores::Cores;
-use memory::Memory;
+use memory::{Fetched, Memory};
 use station::StationState;
 use tally::Tally;
 
 use crate::clock::{Clocks, Time};
-use crate::demand::{CLIENTS, COLOUR_PORT, DemandBuilder, ServiceDemand, Station};
+use crate::demand::{CLIENTS, COLOUR_PORT, COMMAND_PORT, DemandBuilder, ServiceDemand, Station};
 use crate::draws::{DrawTimes, Passes};
 use crate::spec::MachineSpec;
 use crate::stepped::Stream;
@@ -62,6 +62,8 @@ struct Visit<'a> {
     demand: &'a ServiceDemand,
     /// All its lines, grouped by client.
     lines: &'a [LineAccess],
+    /// Lines of its unit that are requested already.
+    fetched: Option<Fetched>,
     /// When it arrives, and when the next station has room for it; at [`Station::Pixel`], when the cores have.
     arrive: Time,
     room: Time,
@@ -106,6 +108,9 @@ struct WaitingPacket {
     demand: ServiceDemand,
     counts: PacketCounts,
     lines: Vec<LineAccess>,
+    /// How many of the lines of its first unit are requested, and their times.
+    requested: usize,
+    fetched: Option<Fetched>,
 }
 
 /// Clock that advances by packets.
@@ -257,39 +262,64 @@ impl PacketClock {
                 demand: demand.clone(),
                 counts: *counts,
                 lines: lines.to_vec(),
+                requested: 0,
+                fetched: None,
             });
             return;
         }
         if !self.ahead.is_empty() {
             self.catch_up(demand.barrier.is_none().then_some(demand.batch));
         }
-        self.walk(demand, counts, lines);
+        self.walk(demand, counts, lines, None);
     }
 
     /// Simulate the front end up to the batch that the tiles need (all of it before a barrier), and as far as it
     /// is behind the tiles in time.
     fn catch_up(&mut self, batch: Option<u32>) {
-        while let Some(WaitingPacket { demand, .. }) = self.ahead.front() {
+        while let Some(WaitingPacket { demand, fetched, .. }) = self.ahead.front() {
             let before = demand.batch.checked_sub(2);
             let waits = |oldest: &OnCores| before.is_some_and(|before| oldest.demand.batch <= before);
             let needed = batch.is_none_or(|batch| demand.batch <= batch);
+            let begins = match fetched {
+                Some(_) => self.memory.next_accepted(COMMAND_PORT),
+                None => self.stations[0].free().max(self.gates.opens(demand)),
+            };
             let behind = !self.on_cores.front().is_some_and(waits)
-                && self.stations[0].free().max(self.gates.opens(demand))
-                    <= self.stations[Station::Traversal as usize].free();
+                && begins <= self.stations[Station::Traversal as usize].free();
             if !(needed || behind) {
                 return;
             }
             while self.on_cores.front().is_some_and(waits) {
                 self.depart();
             }
-            if let Some(WaitingPacket { demand, counts, lines }) = self.ahead.pop_front() {
-                self.walk(&demand, &counts, &lines);
-            }
+            self.go_ahead();
+        }
+    }
+
+    /// Request the next lines of the front end, or simulate its next packet if all are requested.
+    fn go_ahead(&mut self) {
+        let Some(WaitingPacket { demand, lines, requested, fetched, .. }) = self.ahead.front_mut() else {
+            return;
+        };
+        let all = demand.lines[COMMAND_PORT] as usize;
+        if *requested < all && demand.barrier.is_none() && !self.is_too_long {
+            let start = self.stations[0].starts(self.gates.opens(demand));
+            let turn = self.gates.turn(demand);
+            let fetched = fetched.get_or_insert(Fetched::none(start));
+            *requested += self.memory.request_run(COMMAND_PORT, &lines[*requested..all], turn, fetched);
+        } else if let Some(WaitingPacket { demand, counts, lines, fetched, .. }) = self.ahead.pop_front() {
+            self.walk(&demand, &counts, &lines, fetched);
         }
     }
 
     /// Move a packet from its first station to its last.
-    fn walk(&mut self, demand: &ServiceDemand, counts: &PacketCounts, lines: &[LineAccess]) {
+    fn walk(
+        &mut self,
+        demand: &ServiceDemand,
+        counts: &PacketCounts,
+        lines: &[LineAccess],
+        fetched: Option<Fetched>,
+    ) {
         if demand.barrier.is_some() {
             self.drain();
         }
@@ -307,14 +337,17 @@ impl PacketClock {
         for &station in &Station::ALL[first as usize..=demand.last as usize] {
             if station == Station::Pixel {
                 let (arrive, room) = self.admit(demand, arrive);
-                let visit = Visit { station, demand, lines, arrive: self.edge(station, arrive), room, turn };
+                let arrive = self.edge(station, arrive);
+                let visit = Visit { station, demand, lines, fetched: None, arrive, room, turn };
                 self.cores(&visit, counts, &mut memory);
                 return self.stay(visit, counts, begin, memory);
             }
             // A packet leaves when the next queue has room, which it sees one cycle later.
             let next = (station != demand.last).then(|| &self.stations[station as usize + 1]);
             let room = next.map_or(0, |next| next.queue.room_at());
-            let visit = Visit { station, demand, lines, arrive: self.edge(station, arrive), room, turn };
+            let fetched = fetched.filter(|_| station == first);
+            let visit =
+                Visit { station, demand, lines, fetched, arrive: self.edge(station, arrive), room, turn };
             let leave = match station.unit() {
                 Unit::Shader => self.cores(&visit, counts, &mut memory),
                 _ => self.serve(&visit, counts, &mut memory),
@@ -395,7 +428,8 @@ impl PacketClock {
             lines.clear();
             lines.extend(self.lines_on_cores.drain(..demand.lines[COLOUR_PORT] as usize));
             let arrive = self.edge(station, at);
-            let visit = Visit { station, demand: &demand, lines: &lines, arrive, room: 0, turn };
+            let visit =
+                Visit { station, demand: &demand, lines: &lines, fetched: None, arrive, room: 0, turn };
             at = self.serve(&visit, &counts, &mut memory) + self.stations[station as usize].latency;
             self.leaving = lines;
         }

@@ -4,7 +4,7 @@ use super::Visit;
 use super::calendar::QueueTimes;
 use super::memory::{Fetched, Memory};
 use crate::clock::{Clocks, Time};
-use crate::demand::{Server, Station, Work, port};
+use crate::demand::{CYCLE, Server, Station, Work, port, request_work};
 use crate::spec::MachineSpec;
 
 /// First edge of a clock at or after `at`. Most times are edges already.
@@ -24,6 +24,7 @@ pub(super) struct StationState {
     server: Server,
     departed: Time,
     port: Option<usize>,
+    client: ClientWork,
     /// Packets that wait for their lines after service.
     behind: Option<QueueTimes>,
 }
@@ -49,6 +50,41 @@ impl Service {
     }
 }
 
+/// How long a client of the L2 works: for its events, and until it has made its requests.
+#[derive(Clone, Debug)]
+pub(super) struct ClientWork {
+    /// Work of a request.
+    request: Work,
+    /// The last cycle in which it worked so far, and the part of that up to the end of its work.
+    end: (Time, Work),
+}
+
+impl ClientWork {
+    /// A client with so many requests in a cycle.
+    pub fn new(lines_per_cycle: u32) -> Self {
+        Self { request: request_work(lines_per_cycle), end: (0, 0) }
+    }
+
+    /// A service with its `lines` requests, the last of them at `last`. It takes no time that work before it took.
+    pub fn with_requests(&mut self, service: Service, lines: u32, last: Time) -> Service {
+        let Service { from, to, used, work, period } = service;
+        let (begin, requests) = (self.end.max((from, used[0])), self.request * lines as Work);
+        let end = if requests > work && last >= to { (last, CYCLE) } else { (to, used[1]) };
+        self.end = end.max(begin);
+        if requests <= work && begin.0 == from && begin.1 == used[0] {
+            return service;
+        }
+        let left = (self.end.0 - begin.0) / period * CYCLE + self.end.1 - begin.1;
+        Service {
+            from: begin.0,
+            to: self.end.0,
+            used: [begin.1, self.end.1],
+            work: work.max(requests).min(left),
+            period,
+        }
+    }
+}
+
 /// Times of a packet at a unit.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Served {
@@ -70,6 +106,7 @@ impl StationState {
             server: Server::default(),
             departed: 0,
             port,
+            client: ClientWork::new(common.lines_per_cycle),
             behind: (common.in_flight > 0).then(|| QueueTimes::new(common.in_flight)),
         }
     }
@@ -105,7 +142,7 @@ impl StationState {
         let work = visit.demand.service[visit.station as usize];
         let service = Service::of(&mut self.server, start, self.period, work);
         let busy_to = service.to;
-        let fetched = self.fetch(visit, start, memory);
+        let fetched = visit.fetched.or_else(|| self.fetch(visit, start, memory));
         let last_request =
             fetched.as_ref().map_or(busy_to, |fetched| self.later(busy_to, fetched.last_request));
         let answered = |fetched: &Fetched| match visit.demand.barrier {
@@ -128,6 +165,8 @@ impl StationState {
         }
         self.departed = leave;
         self.queue.note(start + 1);
+        let lines = self.port.map(|port| visit.demand.lines[port]);
+        let service = lines.map_or(service, |lines| self.client.with_requests(service, lines, last_request));
         Served { service, leave, fetched }
     }
 
