@@ -503,7 +503,7 @@ mod tests {
     #[test]
     fn a_level_that_differs_is_checked_by_all_packets() {
         let units = reference();
-        let (slices, all) = broken(&units, "one giant triangle");
+        let (slices, all) = broken(&units, "passes in a chain");
         let [packet, bound] = [Level::Packet, Level::Bound]
             .map(|level| cycles(all.iter(), level, machine(&units)).unwrap() as f64);
         let check = |level, cycles| slices.check(level, machine(&units), cycles).unwrap();

@@ -30,6 +30,7 @@
 //! ```
 
 mod bound;
+mod channel;
 mod check;
 mod chips;
 mod clock;

@@ -9,6 +9,8 @@ use activity::LineAccess;
 use super::Span;
 use super::bank::{Bank, Lines, OpenRow, RowUse};
 use super::calendar::{Calendar, Pauses};
+use super::station::aligned;
+use crate::channel;
 use crate::chips::{AddressMap, ChipTimes, RowAddress, TurnPolicy};
 use crate::clock::{Clocks, Time};
 use crate::spec::MachineSpec;
@@ -67,9 +69,52 @@ impl BusTurns {
     }
 }
 
+/// Queue of a channel and the commands for its lines.
+///
+/// The calendars let a bus be busy as long as any line waits. In truth rows of the lines in its queue may be
+/// closed, and the bus turns between reads and writes. How much that costs depends on the lines; so they are
+/// served command by command here. While the queue is full nothing makes up for it.
+#[derive(Clone, Debug)]
+struct Queue {
+    commands: channel::Channel<()>,
+    now: Time,
+    /// Idle time of the bus that its calendar has already, since lines wait.
+    known: Time,
+}
+
+impl Queue {
+    /// Let a line come at `seen`. Returns for how long the bus idles until there is room for it, beyond what is
+    /// known.
+    fn push(&mut self, address: RowAddress, is_write: bool, seen: Time, rules: &Rules) -> Time {
+        let Rules { places, commands: times, period, .. } = rules;
+        let more = [usize::from(!is_write), usize::from(is_write)];
+        let mut idle = 0;
+        while !self.commands.is_empty()
+            && (self.now <= seen || !self.commands.has_room(places, more, self.now))
+        {
+            let free = self.commands.bus_free_at().max(seen);
+            let (moved, acted) = self.commands.tick(self.now, places, times);
+            if let Some(line) = moved.filter(|_| self.now > free) {
+                let since = self.commands.waits_since().unwrap_or(self.now).min(line.seen_at);
+                idle += self.now - free.max(since);
+            }
+            let next = if acted { None } else { self.commands.wakes_at(self.now, times) };
+            self.now = aligned(next.unwrap_or(self.now + period), *period);
+        }
+        if self.commands.is_empty() {
+            self.known = 0;
+        }
+        self.commands.push(address, (!is_write).then_some(()), seen);
+        let new = idle.saturating_sub(self.known);
+        self.known -= idle - new;
+        new
+    }
+}
+
 #[derive(Clone, Debug)]
 struct Channel {
     bus: Calendar,
+    queue: Queue,
     turns: BusTurns,
     banks: Vec<Bank>,
     ranks: Vec<Rank>,
@@ -102,9 +147,10 @@ struct Waiting {
 
 impl Channel {
     /// A channel that remembers `groups` groups of lines.
-    fn new(bus: Calendar, ranks: Vec<Rank>, banks: Vec<Bank>, groups: usize) -> Self {
+    fn new(bus: Calendar, queue: Queue, ranks: Vec<Rank>, banks: Vec<Bank>, groups: usize) -> Self {
         Self {
             bus,
+            queue,
             turns: BusTurns::default(),
             banks,
             ranks,
@@ -128,16 +174,16 @@ impl Channel {
         let waits = |line: &&Waiting| line.seen <= seen && line.issued > seen;
         self.leaving.clear();
         self.leaving.extend(self.recent.iter().filter(waits).map(|line| (line.issued, line.count)));
-        self.leaving.sort_unstable();
-        // The last to leave may stay in the queue.
-        let mut held = 0;
-        for &(issued, count) in self.leaving.iter().rev() {
-            if held + count > most {
-                return issued.saturating_sub((most - held) * burst).max(seen);
-            }
-            held += count;
+        let mut held: u64 = self.leaving.iter().map(|&(_, count)| count).sum();
+        let mut room = seen;
+        // Those that leave first. The last of a group may stay in the queue.
+        while held > most {
+            let first = (0..self.leaving.len()).min_by_key(|&at| self.leaving[at]);
+            let Some((issued, count)) = first.map(|at| self.leaving.swap_remove(at)) else { break };
+            held -= count;
+            room = issued.saturating_sub(most.saturating_sub(held) * burst).max(seen);
         }
-        seen
+        room
     }
 
     /// Whether the last `queue` lines are all of `bank`.
@@ -167,6 +213,7 @@ impl Channel {
         let turned = self.turns.add(kind, lines.count.into(), pair, &rules.turns);
         if turned > 0 {
             // Turns of a bus that waits for one bank are part of the openings of its rows.
+            self.queue.known += turned;
             self.bus.block(idle.filter(|_| turns_rows).unwrap_or(ready), turned);
         }
         let end = self.bus.reserve_as(lines.turn, ready, work).1.max(seen.to + rules.times.burst);
@@ -210,7 +257,9 @@ impl Channel {
         // that joined their row would fill the gap.
         let idle = begin + times.burst;
         if blocks_bus {
-            self.bus.block(idle, opens.saturating_sub(times.burst).min(before.joined));
+            let length = opens.saturating_sub(times.burst).min(before.joined);
+            self.queue.known += length;
+            self.bus.block(idle, length);
         }
         (begin + opens, idle)
     }
@@ -270,6 +319,10 @@ fn pauses(times: &ChipTimes, rank: u32, ranks: u32) -> Option<Pauses> {
 #[derive(Clone, Debug)]
 struct Rules {
     times: ChipTimes,
+    /// The same without refresh, which the calendars have.
+    commands: ChipTimes,
+    places: channel::Places,
+    period: Time,
     turns: TurnPolicy,
     /// Lines that wait in front of a channel.
     queue: u64,
@@ -307,14 +360,19 @@ impl Dram {
         let reopening = alone.map(|pauses| Pauses { length: pauses.length + times.activate[0], ..pauses });
         let longest_line = times.burst.max(times.row_cycle(0).max(times.row_cycle(1)));
         let remembered = (RECENT_GROUPS * queue as usize).min(MAX_RECENT_GROUPS);
+        let commands = ChipTimes { refresh: None, ..times };
+        let lines = Queue { commands: channel::Channel::new(spec, &commands), now: 0, known: 0 };
         let banks = ranks.iter().flat_map(|rank| vec![bank(rank); banks]).collect();
-        let channel = Channel::new(bus.with_pauses(reopening), ranks, banks, remembered);
+        let channel = Channel::new(bus.with_pauses(reopening), lines, ranks, banks, remembered);
         Self {
             map: AddressMap::new(spec),
             channels: vec![channel; spec.channels.get() as usize],
             rules: Rules {
                 turns: TurnPolicy::new(spec, &times),
                 times,
+                commands,
+                places: channel::Places::new(machine),
+                period: clocks.period(spec.clock),
                 queue,
                 longest_wait: longest_line * queue,
             },
@@ -336,6 +394,7 @@ impl Dram {
     /// When the first and the last of `count` requests like `head` enter the queues of their channels, which
     /// have room for all lines of a request at once. They come at `seen`.
     pub fn admits(&mut self, head: &LineAccess, count: u32, seen: Span) -> Span {
+        self.pass_queues(head, count, seen);
         let channel_of = |line| self.map.locate(line).channel;
         let mut enters = seen;
         for line in head.moved() {
@@ -348,6 +407,22 @@ impl Dram {
             enters.to = enters.to.max(room(lines * u64::from(count), seen.to));
         }
         Span { from: enters.from, to: enters.to.max(enters.from) }
+    }
+
+    /// Let `count` requests like `head` pass the queues of their channels. Buses have no time for other lines while
+    /// they idle with a full queue.
+    fn pass_queues(&mut self, head: &LineAccess, count: u32, seen: Span) {
+        for at in (0..count).map(|request| seen.spread(request, count)) {
+            for line in head.moved() {
+                let address = self.map.locate(line);
+                let channel = &mut self.channels[address.channel];
+                let is_write = head.fetched() != Some(line);
+                let idle = channel.queue.push(address, is_write, at, &self.rules);
+                if idle > 0 {
+                    channel.bus.block(at, idle);
+                }
+            }
+        }
     }
 
     /// Transfer lines of one group over the bus of their channel. Returns when the last is transferred.
@@ -372,10 +447,19 @@ impl Dram {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::spec::DramSpec;
 
     #[test]
     fn lines_that_join_a_row_keep_those_of_the_next_in_the_queue() {
-        let mut channel = Channel::new(Calendar::new(16, 1), Vec::new(), Vec::new(), 4);
+        let spec: DramSpec = activity::spec::parse(
+            "(clock: Core, latency_cycles: 1, queue: 4, channels: 1, banks: 1, row_bytes: 512, interleave_bytes: 64, \
+             burst_cycles: 1, cas_cycles: 3, activate_cycles: 4, precharge_cycles: 5)",
+            "test",
+        )
+        .unwrap();
+        let times = ChipTimes::new(&spec, &Clocks::new(1e9, 1e9).unwrap());
+        let queue = Queue { commands: channel::Channel::new(&spec, &times), now: 0, known: 0 };
+        let mut channel = Channel::new(Calendar::new(16, 1), queue, Vec::new(), Vec::new(), 4);
         let line = |bank, row, issued| Waiting { seen: 0, issued, count: 1, bank, row };
         let lines = [line(0, 7, 40), line(0, 8, 60), line(1, 8, 60), line(0, 9, 80)];
         lines.into_iter().for_each(|line| channel.note(line));

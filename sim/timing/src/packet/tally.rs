@@ -25,6 +25,9 @@ pub(super) fn write_calendar(
     // Work of the bin at `at_ps` that is not yet written, and the end of that bin.
     let (mut work, mut at_ps, mut end) = (0, 0, 0);
     let flush = |recorder: &mut Recorder, work: u64, at_ps| {
+        if work == 0 {
+            return;
+        }
         let busy_ps = clocks.ps_below(work / (calendar.servers() * servers));
         recorder.busy(unit, at_ps, at_ps + busy_ps, 1, 1);
     };
