@@ -447,19 +447,52 @@ impl Dram {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::spec::DramSpec;
 
-    #[test]
-    fn lines_that_join_a_row_keep_those_of_the_next_in_the_queue() {
-        let spec: DramSpec = activity::spec::parse(
+    /// One channel of one bank with four places: a line takes a cycle, another row nine.
+    fn memory() -> Dram {
+        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../run/gpus/reference.ron");
+        #[derive(serde::Deserialize)]
+        struct Gpu {
+            units: MachineSpec,
+        }
+        let mut machine = activity::spec::load::<Gpu>(path.as_ref()).unwrap().units;
+        machine.dram = activity::spec::parse(
             "(clock: Core, latency_cycles: 1, queue: 4, channels: 1, banks: 1, row_bytes: 512, interleave_bytes: 64, \
              burst_cycles: 1, cas_cycles: 3, activate_cycles: 4, precharge_cycles: 5)",
             "test",
         )
         .unwrap();
-        let times = ChipTimes::new(&spec, &Clocks::new(1e9, 1e9).unwrap());
-        let queue = Queue { commands: channel::Channel::new(&spec, &times), now: 0, known: 0 };
-        let mut channel = Channel::new(Calendar::new(16, 1), queue, Vec::new(), Vec::new(), 4);
+        Dram::new(&machine, &Clocks::new(1e9, 1e9).unwrap())
+    }
+
+    /// For how long the bus of a channel idles with a full queue for lines of some rows, which come at once.
+    fn idles(rows: &[u32], known: Time) -> Time {
+        let Dram { channels, rules, .. } = memory();
+        let mut queue = channels[0].queue.clone();
+        queue.known = known;
+        let address = |row| RowAddress { channel: 0, bank: 0, row };
+        // What is known counts from the first line that waits.
+        queue.push(address(rows[0]), false, 0, &rules);
+        queue.known = known;
+        rows[1..].iter().map(|&row| queue.push(address(row), false, 0, &rules)).sum()
+    }
+
+    #[test]
+    fn a_bus_idles_with_a_full_queue_while_rows_open() {
+        assert_eq!(idles(&[1, 2, 3, 4], 0), 0, "not full");
+        // The row of the first opens in four cycles. To close one and open the next takes nine, one of them for a line.
+        assert_eq!(idles(&[1, 2, 3, 4, 5], 0), 4);
+        assert_eq!(idles(&[1, 2, 3, 4, 5, 6, 7], 0), 4 + 2 * 8);
+        // Lines of one row wait for one another only.
+        assert_eq!(idles(&[1; 40], 0), 4);
+        // The calendar has some of it.
+        assert_eq!(idles(&[1, 2, 3, 4, 5, 6, 7], 13), 4 + 2 * 8 - 13);
+    }
+
+    #[test]
+    fn lines_that_join_a_row_keep_those_of_the_next_in_the_queue() {
+        let mut channel = memory().channels.remove(0);
+        channel.recent = vec![Waiting::default(); 4].into();
         let line = |bank, row, issued| Waiting { seen: 0, issued, count: 1, bank, row };
         let lines = [line(0, 7, 40), line(0, 8, 60), line(1, 8, 60), line(0, 9, 80)];
         lines.into_iter().for_each(|line| channel.note(line));

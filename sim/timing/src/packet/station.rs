@@ -68,7 +68,8 @@ impl ClientWork {
     /// A service with its `lines` requests, the last of them at `last`. It takes no time that work before it took.
     pub fn with_requests(&mut self, service: Service, lines: u32, last: Time) -> Service {
         let Service { from, to, used, work, period } = service;
-        let (begin, requests) = (self.end.max((from, used[0])), self.request * lines as Work);
+        let last = aligned(last, period);
+        let (begin, requests) = (self.end.max((from, used[0])), self.request * Work::from(lines));
         let end = if requests > work && last >= to { (last, CYCLE) } else { (to, used[1]) };
         self.end = end.max(begin);
         if requests <= work && begin.0 == from && begin.1 == used[0] {
@@ -179,5 +180,28 @@ impl StationState {
         let first = visit.demand.first_line;
         let lines = &visit.lines[range.start - first..range.end - first];
         Some(memory.request(port, lines, visit.turn, start))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_client_works_until_it_has_made_its_requests_and_never_twice_at_once() {
+        let (mut server, mut client) = (Server::default(), ClientWork::new(2));
+        let mut busy = |start, work, lines, last| {
+            let Service { from, to, used, work, .. } =
+                client.with_requests(Service::of(&mut server, start, 10, work), lines, last);
+            (from, to, used, work)
+        };
+        // A cycle and a half of work; three lines take as long.
+        assert_eq!(busy(0, 3 * CYCLE / 2, 3, 10), (0, 10, [0, CYCLE / 2], 3 * CYCLE / 2));
+        // Eight lines take four cycles, though the last waits in between.
+        assert_eq!(busy(20, CYCLE, 8, 70), (20, 70, [0, CYCLE], 4 * CYCLE));
+        // Begins in the cycle of the last request, all of which is taken; requests at times of another clock end a cycle.
+        assert_eq!(busy(70, CYCLE / 2, 6, 93), (70, 100, [CYCLE, CYCLE], 3 * CYCLE));
+        assert_eq!(busy(100, CYCLE / 4, 0, 100), (100, 100, [CYCLE, CYCLE], 0));
+        assert_eq!(busy(110, CYCLE, 0, 110), (110, 120, [0, 0], CYCLE));
     }
 }

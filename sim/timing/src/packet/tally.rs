@@ -181,7 +181,21 @@ impl Tally {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Recorder;
     use activity::Event;
+
+    #[test]
+    fn a_slot_that_ends_after_the_frame_does_not_lengthen_it() {
+        let clocks = Clocks::new(1e9, 1e9).unwrap();
+        let mut calendar = Calendar::new(16, 1);
+        calendar.reserve(0, 20);
+        // Slots end at 16,000 and 32,000 ps, where bins begin.
+        let mut recorder = Recorder::new(16_000, 16);
+        recorder.lasts(20_000);
+        write_calendar(&mut recorder, &clocks, Unit::Dram, &calendar, 1, 20_000);
+        let timeline = recorder.finish();
+        assert_eq!((timeline.duration_ps, timeline.busy_ps()[Unit::Dram as usize]), (20_000, 20_000));
+    }
 
     /// Packets in and out of time order, through a tally and directly through a recorder.
     #[test]

@@ -175,7 +175,7 @@ fn contended(per_front: u32, per_tile: u32, gpu: &Gpu) -> Packets {
 fn front_ends_take_turns_with_tiles() {
     for name in ["mobile", "reference", "discrete"] {
         let gpu = Gpu::builtin(name);
-        for (per_front, per_tile) in [(16, 16), (16, 48), (64, 48)] {
+        for (per_front, per_tile) in [(16, 16), (16, 48), (64, 48), (128, 8)] {
             let [truth, packet, _] = gpu.run(&gpu.units, &contended(per_front, per_tile, &gpu));
             let percent = 100.0 * (packet.cycles as f64 / truth.cycles as f64 - 1.0);
             assert!(percent.abs() < 8.0, "{name}, {per_front} and {per_tile} lines: {percent:.1} %");
