@@ -4,6 +4,8 @@
 //! which closes or opens a row. Each goes to the oldest line whose command the chips can take, so that lines
 //! of one direction go on while the bus could not turn yet. With a queue of writes, reads go first until it
 //! is full. Refreshes come at fixed times.
+//!
+//! `stepped` serves all lines so, and `packet`, without refreshes, for the idle time of full queues.
 
 use crate::chips::{ChipTimes, RowAddress};
 use crate::clock::Time;

@@ -182,8 +182,8 @@ pub struct DemandBuilder {
     costs: [Vec<(Event, f64)>; Station::COUNT],
     /// Cycles per event of each data unit.
     data_cycles: [[f64; DATA_EVENTS]; DataUnit::ALL.len()],
-    /// Work of a line request of each client of the L2.
-    request_work: [Work; CLIENTS.len()],
+    /// Lines per cycle that each client of the L2 can request.
+    lines_per_cycle: [u32; CLIENTS.len()],
     /// Pass of the last packet, number of its first batch in the frame, and number of the last batch.
     pass: u32,
     first_batch: u32,
@@ -204,7 +204,7 @@ impl DemandBuilder {
         Self {
             costs,
             data_cycles: DataUnit::ALL.map(|unit| unit.events().map(cycles)),
-            request_work: CLIENTS.map(|unit| request_work(machine.common(unit).lines_per_cycle)),
+            lines_per_cycle: CLIENTS.map(|unit| machine.common(unit).lines_per_cycle),
             pass: 0,
             first_batch: 0,
             last_batch: 0,
@@ -299,7 +299,7 @@ impl DemandBuilder {
                 .map(service);
         let served = [command, depth, data, colour, data, setup, traversal];
         for (port, served) in served.into_iter().enumerate() {
-            let requests = Work::from(demand.lines[port]) * self.request_work[port];
+            let requests = request_work(demand.lines[port], self.lines_per_cycle[port]);
             add(CLIENTS[port], requests.saturating_sub(served));
             add(Unit::L2, demand.lines[port].into());
         }
@@ -339,9 +339,9 @@ fn sorted(lines: &[LineAccess], store: &mut Vec<LineAccess>) -> [u32; CLIENTS.le
     })
 }
 
-/// Work of a line request of a client that can make so many in a cycle.
-pub(crate) fn request_work(lines_per_cycle: u32) -> Work {
-    CYCLE / Work::from(lines_per_cycle.max(1))
+/// Work of `lines` requests of a client that can make so many in a cycle.
+pub(crate) fn request_work(lines: u32, lines_per_cycle: u32) -> Work {
+    Work::from(lines) * CYCLE / Work::from(lines_per_cycle.max(1))
 }
 
 /// Work of a unit: cycles of its clock, in units of 1 / [`CYCLE`].

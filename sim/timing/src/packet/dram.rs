@@ -2,7 +2,8 @@
 //!
 //! What the chips allow is in the calendars: a refresh is a pause in them, a row keeps its bank as long as it
 //! has to stay open, and every rank has a calendar of its activations. The bus turns as often as it has to
-//! with full queues.
+//! with full queues of open rows. The lines of a channel also pass its queue ([`Queue`]) command by command, for the time
+//! that the bus idles with a full queue beyond that.
 
 use activity::LineAccess;
 
@@ -69,44 +70,43 @@ impl BusTurns {
     }
 }
 
-/// Queue of a channel and the commands for its lines.
+/// Queue of a channel.
 ///
-/// The calendars let a bus be busy as long as any line waits. In truth rows of the lines in its queue may be
-/// closed, and the bus turns between reads and writes. How much that costs depends on the lines; so they are
-/// served command by command here. While the queue is full nothing makes up for it.
+/// A calendar keeps its bus busy while any line waits. Real rows may be closed, and the bus turns between reads
+/// and writes. The cost depends on the lines, so they are served here command by command, as at `stepped`. Idle
+/// time counts only while the queue is full: with room, later lines fill the gap.
 #[derive(Clone, Debug)]
 struct Queue {
-    commands: channel::Channel<()>,
+    channel: channel::Channel<()>,
     now: Time,
-    /// Idle time of the bus that its calendar has already, since lines wait.
-    known: Time,
+    /// Idle time that is blocked in the calendar of the bus already, since the queue was last empty.
+    booked_idle: Time,
 }
 
 impl Queue {
-    /// Let a line come at `seen`. Returns for how long the bus idles until there is room for it, beyond what is
-    /// known.
+    /// Let a line come at `seen`. Returns for how long the bus idles from then on until there is room for it, beyond
+    /// what its calendar has. Lines come in stream order, so `now` may be later.
     fn push(&mut self, address: RowAddress, is_write: bool, seen: Time, rules: &Rules) -> Time {
-        let Rules { places, commands: times, period, .. } = rules;
+        let Rules { places, times_without_refresh: times, period, .. } = rules;
         let more = [usize::from(!is_write), usize::from(is_write)];
         let mut idle = 0;
-        while !self.commands.is_empty()
-            && (self.now <= seen || !self.commands.has_room(places, more, self.now))
+        while !self.channel.is_empty() && (self.now <= seen || !self.channel.has_room(places, more, self.now))
         {
-            let free = self.commands.bus_free_at().max(seen);
-            let (moved, acted) = self.commands.tick(self.now, places, times);
+            let free = self.channel.bus_free_at().max(seen);
+            let (moved, acted) = self.channel.tick(self.now, places, times);
             if let Some(line) = moved.filter(|_| self.now > free) {
-                let since = self.commands.waits_since().unwrap_or(self.now).min(line.seen_at);
+                let since = self.channel.waits_since().unwrap_or(self.now).min(line.seen_at);
                 idle += self.now - free.max(since);
             }
-            let next = if acted { None } else { self.commands.wakes_at(self.now, times) };
+            let next = if acted { None } else { self.channel.wakes_at(self.now, times) };
             self.now = aligned(next.unwrap_or(self.now + period), *period);
         }
-        if self.commands.is_empty() {
-            self.known = 0;
+        if self.channel.is_empty() {
+            self.booked_idle = 0;
         }
-        self.commands.push(address, (!is_write).then_some(()), seen);
-        let new = idle.saturating_sub(self.known);
-        self.known -= idle - new;
+        self.channel.push(address, (!is_write).then_some(()), seen);
+        let new = idle.saturating_sub(self.booked_idle);
+        self.booked_idle -= idle - new;
         new
     }
 }
@@ -213,7 +213,7 @@ impl Channel {
         let turned = self.turns.add(kind, lines.count.into(), pair, &rules.turns);
         if turned > 0 {
             // Turns of a bus that waits for one bank are part of the openings of its rows.
-            self.queue.known += turned;
+            self.queue.booked_idle += turned;
             self.bus.block(idle.filter(|_| turns_rows).unwrap_or(ready), turned);
         }
         let end = self.bus.reserve_as(lines.turn, ready, work).1.max(seen.to + rules.times.burst);
@@ -258,7 +258,7 @@ impl Channel {
         let idle = begin + times.burst;
         if blocks_bus {
             let length = opens.saturating_sub(times.burst).min(before.joined);
-            self.queue.known += length;
+            self.queue.booked_idle += length;
             self.bus.block(idle, length);
         }
         (begin + opens, idle)
@@ -319,8 +319,8 @@ fn pauses(times: &ChipTimes, rank: u32, ranks: u32) -> Option<Pauses> {
 #[derive(Clone, Debug)]
 struct Rules {
     times: ChipTimes,
-    /// The same without refresh, which the calendars have.
-    commands: ChipTimes,
+    /// The calendars have the refreshes.
+    times_without_refresh: ChipTimes,
     places: channel::Places,
     period: Time,
     turns: TurnPolicy,
@@ -360,17 +360,18 @@ impl Dram {
         let reopening = alone.map(|pauses| Pauses { length: pauses.length + times.activate[0], ..pauses });
         let longest_line = times.burst.max(times.row_cycle(0).max(times.row_cycle(1)));
         let remembered = (RECENT_GROUPS * queue as usize).min(MAX_RECENT_GROUPS);
-        let commands = ChipTimes { refresh: None, ..times };
-        let lines = Queue { commands: channel::Channel::new(spec, &commands), now: 0, known: 0 };
+        let times_without_refresh = ChipTimes { refresh: None, ..times };
+        let queue_of_channel =
+            Queue { channel: channel::Channel::new(spec, &times_without_refresh), now: 0, booked_idle: 0 };
         let banks = ranks.iter().flat_map(|rank| vec![bank(rank); banks]).collect();
-        let channel = Channel::new(bus.with_pauses(reopening), lines, ranks, banks, remembered);
+        let channel = Channel::new(bus.with_pauses(reopening), queue_of_channel, ranks, banks, remembered);
         Self {
             map: AddressMap::new(spec),
             channels: vec![channel; spec.channels.get() as usize],
             rules: Rules {
                 turns: TurnPolicy::new(spec, &times),
                 times,
-                commands,
+                times_without_refresh,
                 places: channel::Places::new(machine),
                 period: clocks.period(spec.clock),
                 queue,
@@ -466,14 +467,13 @@ mod tests {
     }
 
     /// For how long the bus of a channel idles with a full queue for lines of some rows, which come at once.
-    fn idles(rows: &[u32], known: Time) -> Time {
+    fn idles(rows: &[u32], booked: Time) -> Time {
         let Dram { channels, rules, .. } = memory();
         let mut queue = channels[0].queue.clone();
-        queue.known = known;
         let address = |row| RowAddress { channel: 0, bank: 0, row };
-        // What is known counts from the first line that waits.
+        // The first line finds an empty queue, which forgets what is booked.
         queue.push(address(rows[0]), false, 0, &rules);
-        queue.known = known;
+        queue.booked_idle = booked;
         rows[1..].iter().map(|&row| queue.push(address(row), false, 0, &rules)).sum()
     }
 

@@ -27,7 +27,7 @@ pub(super) struct Fetched {
 }
 
 impl Fetched {
-    /// Before the first of requests that begin at `start`.
+    /// Times before any request, for requests from `start` on.
     pub const fn none(start: Time) -> Self {
         Self { last_request: start, first: Time::MAX, last: 0, arrived: 0, moved: 0 }
     }
@@ -146,7 +146,8 @@ impl Memory {
         self.pacers[port].at.max(self.order[port])
     }
 
-    /// Request those of `lines`, of which there are some, that go one way. Returns how many.
+    /// Request the first run of `lines`, of which there are some: those with one route that fit into the queue of the
+    /// port. Starts no earlier than the last request in `fetched`. Returns its length.
     pub fn request_run(
         &mut self,
         port: usize,
@@ -372,6 +373,29 @@ impl CacheLevel {
     /// the first and the last are accepted.
     fn accept(&mut self, lines: u32, turn: Turn, seen: Span) -> Span {
         let (from, end) = self.calendar.reserve_as(turn, seen.from, u64::from(lines) * self.period);
-        Span { from, to: end.saturating_sub(self.period).max(seen.to) }
+        Span { from, to: end.saturating_sub(self.period).max(seen.to).max(from) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_full_level_accepts_the_last_line_no_earlier_than_the_first() {
+        // Eight slots of eight cycles of 37 grains, four lines a cycle, are taken.
+        let mut level = CacheLevel {
+            unit: Unit::Llc,
+            at: 0,
+            calendar: Calendar::new(8 * 37, 4),
+            period: 37,
+            latency: 0,
+            backlog: 0,
+        };
+        level.accept(8 * 8 * 4, Turn::InOrder, Span { from: 0, to: 0 });
+        for lines in 1..9 {
+            let Span { from, to } = level.accept(lines, Turn::InOrder, Span { from: 3, to: 3 });
+            assert!(64 * 37 <= from && from <= to, "{lines}: {from} to {to}");
+        }
     }
 }

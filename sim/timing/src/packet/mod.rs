@@ -16,7 +16,9 @@
 //! Gershwin 1992). For units that share nothing it equals the level `stepped`, to the cycle. Shared resources
 //! (the L2, buses and banks of memory) are calendars; ports of the L2 take turns in its. The cores serve warps
 //! in turn, so when a packet of pixels or a group leaves them depends on packets that come later. It goes on
-//! once that is known. The front end overlaps tiles that are simulated before it, and gets up to half of a slot that they fill.
+//! once that is known. The front end overlaps tiles that are simulated before it, and gets up to half of a slot that they
+//! fill. It requests its lines run by run (lines with one route), each when the tiles have come to the time at which the
+//! L2 can accept it.
 //!
 //! Packets arrive at their first unit when their gates open. With `tiles(b)` the time when all tiles of batch `b`
 //! have left, `front(b)` likewise, and barrier `i` done at `barrier(i)`:
@@ -62,7 +64,7 @@ struct Visit<'a> {
     demand: &'a ServiceDemand,
     /// All its lines, grouped by client.
     lines: &'a [LineAccess],
-    /// Lines of its unit that are requested already.
+    /// Times of its lines, if they were requested before.
     fetched: Option<Fetched>,
     /// When it arrives, and when the next station has room for it; at [`Station::Pixel`], when the cores have.
     arrive: Time,
@@ -102,7 +104,7 @@ struct OnCores {
     memory: Span,
 }
 
-/// A front-end packet that is not simulated yet.
+/// A front-end packet that has not left the command unit. Some of its lines may be requested.
 #[derive(Debug)]
 struct WaitingPacket {
     demand: ServiceDemand,

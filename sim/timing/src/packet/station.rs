@@ -50,26 +50,25 @@ impl Service {
     }
 }
 
-/// How long a client of the L2 works: for its events, and until it has made its requests.
+/// Busy time of a client of the L2: for its events, and until it has made its requests.
 #[derive(Clone, Debug)]
 pub(super) struct ClientWork {
-    /// Work of a request.
-    request: Work,
-    /// The last cycle in which it worked so far, and the part of that up to the end of its work.
+    lines_per_cycle: u32,
+    /// The cycle in which its work so far ends, and the used part of that.
     end: (Time, Work),
 }
 
 impl ClientWork {
     /// A client with so many requests in a cycle.
     pub fn new(lines_per_cycle: u32) -> Self {
-        Self { request: request_work(lines_per_cycle), end: (0, 0) }
+        Self { lines_per_cycle, end: (0, 0) }
     }
 
-    /// A service with its `lines` requests, the last of them at `last`. It takes no time that work before it took.
+    /// A service with its `lines` requests, the last of them at `last`. Time that earlier work took does not count again.
     pub fn with_requests(&mut self, service: Service, lines: u32, last: Time) -> Service {
         let Service { from, to, used, work, period } = service;
         let last = aligned(last, period);
-        let (begin, requests) = (self.end.max((from, used[0])), self.request * Work::from(lines));
+        let (begin, requests) = (self.end.max((from, used[0])), request_work(lines, self.lines_per_cycle));
         let end = if requests > work && last >= to { (last, CYCLE) } else { (to, used[1]) };
         self.end = end.max(begin);
         if requests <= work && begin.0 == from && begin.1 == used[0] {

@@ -107,7 +107,7 @@ impl Tally {
         self.count(unit, counts, from, to);
         let [begin_ps, end_ps] =
             [(from, used[0]), (to, used[1])].map(|(at, used)| self.clocks.ps_after(at, used * period, CYCLE));
-        // A data unit that serves a packet in parts waits for lines between them.
+        // A client waits between its requests, and a data unit between the parts of a packet.
         let (span_ps, work_ps) = (end_ps - begin_ps, self.clocks.ps_after(0, work * period, CYCLE));
         self.recorder.busy(unit, begin_ps, end_ps, work_ps.min(span_ps), span_ps.max(1));
     }

@@ -152,9 +152,9 @@ fn line_streams_are_as_long_as_in_dramsim3() {
     }
     let far: Vec<_> = all.iter().filter(|compared| compared.percent(0).abs() > 5.0).collect();
     assert_eq!(far.iter().map(|compared| compared.name).collect::<Vec<_>>(), FAR);
-    // `packet` is as near to `stepped` as runs without a warning are.
+    // As docs/validation.md says.
     for Compared { name, found, .. } in &all {
         let ratio = found[1] as f64 / found[0] as f64;
-        assert!((1.0 / 1.055..1.055).contains(&ratio), "{name:?}: {ratio}");
+        assert!((1.0 / 1.03..1.03).contains(&ratio), "{name:?}: {ratio}");
     }
 }
