@@ -5,6 +5,11 @@ use crate::spec::Clock;
 /// A time or a duration, in grains.
 pub type Time = u64;
 
+/// First edge of a clock at or after `at`. Most times are edges already.
+pub(crate) fn aligned(at: Time, period: Time) -> Time {
+    if period == 1 { at } else { at.next_multiple_of(period) }
+}
+
 const PS_PER_MS: u64 = 1_000_000_000;
 /// Largest number of grains in a millisecond. A frame of some seconds then fits into 64 bits.
 const MAX_GRAINS_PER_MS: u64 = 1_000_000_000_000_000;

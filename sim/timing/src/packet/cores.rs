@@ -7,9 +7,9 @@ use super::calendar::{Calendar, QueueTimes};
 use super::memory::Memory;
 use super::residents::Residents;
 use super::slots::{Occupancy, Slots, Turns};
-use super::station::{ClientWork, Service, aligned};
+use super::station::{ClientWork, Service};
 use super::{Span, Visit};
-use crate::clock::{Clocks, Time};
+use crate::clock::{Clocks, Time, aligned};
 use crate::demand::{CYCLE, DemandBuilder, Server, ServiceDemand, Station, WarpKind, Work, share, time_of};
 use crate::spec::{DataUnit, MachineSpec};
 

@@ -10,10 +10,9 @@ use activity::LineAccess;
 use super::Span;
 use super::bank::{Bank, Lines, OpenRow, RowUse};
 use super::calendar::{Calendar, Pauses};
-use super::station::aligned;
 use crate::channel;
 use crate::chips::{AddressMap, ChipTimes, RowAddress, TurnPolicy};
-use crate::clock::{Clocks, Time};
+use crate::clock::{Clocks, Time, aligned};
 use crate::spec::MachineSpec;
 
 /// Lines per slot of a bus calendar. The bus idles while a row opens; longer slots would give that idle time

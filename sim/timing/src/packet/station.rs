@@ -3,14 +3,9 @@
 use super::Visit;
 use super::calendar::QueueTimes;
 use super::memory::{Fetched, Memory};
-use crate::clock::{Clocks, Time};
+use crate::clock::{Clocks, Time, aligned};
 use crate::demand::{CYCLE, Server, Station, Work, port, request_work};
 use crate::spec::MachineSpec;
-
-/// First edge of a clock at or after `at`. Most times are edges already.
-pub(super) fn aligned(at: Time, period: Time) -> Time {
-    if period == 1 { at } else { at.next_multiple_of(period) }
-}
 
 /// State of a unit at a station.
 #[derive(Clone, Debug)]
