@@ -126,7 +126,7 @@ struct Channel {
     last_bank: usize,
     /// Lines up to the last that are of its bank.
     of_last_bank: u64,
-    /// Scratch memory of [`Self::room_at`].
+    /// Scratch memory of [`Self::room_for`].
     leaving: Vec<(Time, u64)>,
     /// When the last line so far is issued.
     last_issued: Time,
