@@ -447,7 +447,7 @@ mod tests {
 
     #[test]
     fn batches_side_by_side_are_timed_by_all_packets() {
-        let units = reference();
+        let units = crate::MachineSpec::reference();
         let (_, all) = broken(&units, "one giant triangle");
         let checked = |batch| {
             let mut slices = SliceWriter::default();
@@ -480,15 +480,6 @@ mod tests {
         Machine { units, clocks: crate::Clocks::new(1e9, 1e9).unwrap() }
     }
 
-    fn reference() -> crate::MachineSpec {
-        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../run/gpus/reference.ron");
-        #[derive(serde::Deserialize)]
-        struct Gpu {
-            units: crate::MachineSpec,
-        }
-        activity::spec::load::<Gpu>(path.as_ref()).unwrap().units
-    }
-
     /// The slices and all packets of a stream that breaks levels.
     fn broken(units: &crate::MachineSpec, name: &str) -> (Slices, PacketBuffer) {
         let case = crate::streams::failures(units, 512).into_iter().find(|case| case.name == name).unwrap();
@@ -502,7 +493,7 @@ mod tests {
 
     #[test]
     fn a_level_that_differs_is_checked_by_all_packets() {
-        let units = reference();
+        let units = crate::MachineSpec::reference();
         let (slices, all) = broken(&units, "passes in a chain");
         let [packet, bound] = [Level::Packet, Level::Bound]
             .map(|level| cycles(all.iter(), level, machine(&units)).unwrap() as f64);
@@ -520,7 +511,7 @@ mod tests {
 
     #[test]
     fn the_reference_is_not_checked_and_frames_without_packets_are_exact() {
-        let units = reference();
+        let units = crate::MachineSpec::reference();
         assert_eq!(slices(9, |_| 1).check(Level::Stepped, machine(&units), 100), None);
         let empty = SliceWriter::default().finish().check(Level::Bound, machine(&units), 0).unwrap();
         assert_eq!((empty.of, empty.error), (0, 0.0));

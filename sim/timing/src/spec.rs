@@ -511,3 +511,16 @@ impl DataUnit {
         }
     }
 }
+
+#[cfg(test)]
+impl MachineSpec {
+    /// The units of the built-in GPU `reference`.
+    pub(crate) fn reference() -> Self {
+        #[derive(Deserialize)]
+        struct Gpu {
+            units: MachineSpec,
+        }
+        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../run/gpus/reference.ron");
+        activity::spec::load::<Gpu>(path.as_ref()).unwrap().units
+    }
+}

@@ -450,12 +450,7 @@ mod tests {
 
     /// One channel of one bank with four places: a line takes a cycle, another row nine.
     fn memory() -> Dram {
-        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../run/gpus/reference.ron");
-        #[derive(serde::Deserialize)]
-        struct Gpu {
-            units: MachineSpec,
-        }
-        let mut machine = activity::spec::load::<Gpu>(path.as_ref()).unwrap().units;
+        let mut machine = MachineSpec::reference();
         machine.dram = activity::spec::parse(
             "(clock: Core, latency_cycles: 1, queue: 4, channels: 1, banks: 1, row_bytes: 512, interleave_bytes: 64, \
              burst_cycles: 1, cas_cycles: 3, activate_cycles: 4, precharge_cycles: 5)",

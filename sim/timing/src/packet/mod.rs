@@ -304,7 +304,7 @@ impl PacketClock {
             return;
         };
         let all = demand.lines[COMMAND_PORT] as usize;
-        if *requested < all && demand.barrier.is_none() && !self.is_too_long {
+        if *requested < all && !self.is_too_long {
             let start = self.stations[0].starts(self.gates.opens(demand));
             let turn = self.gates.turn(demand);
             let fetched = fetched.get_or_insert(Fetched::none(start));

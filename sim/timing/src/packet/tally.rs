@@ -181,7 +181,6 @@ impl Tally {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Recorder;
     use activity::Event;
 
     #[test]
