@@ -154,7 +154,7 @@ impl Prepared {
         let measurement = measure::measure(&plan, &simulated)?;
         let summary =
             Summary { choice, verified, ..Summary::new(&plan, provenance, &simulated, &measurement) }
-                .with_choice_warnings();
+                .with_error_warnings();
         let outcome = FinishedRun { plan, simulated, measurement, summary };
         write::write(&outcome, &dir, progress)?;
         dir.publish()?;

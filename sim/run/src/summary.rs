@@ -228,11 +228,12 @@ impl Summary {
         rows
     }
 
-    /// Adds the warnings about a missed accuracy or budget.
-    pub(super) fn with_choice_warnings(mut self) -> Self {
-        let missed =
-            self.choice.iter().flat_map(|choice| warn::missed_requests(choice, self.verified.as_ref()));
-        self.warnings.extend(missed);
+    /// Adds the warnings about a missed accuracy or budget, and about an actual error beyond the stated one.
+    pub(super) fn with_error_warnings(mut self) -> Self {
+        let verified = self.verified.as_ref();
+        let missed = self.choice.iter().flat_map(|choice| warn::missed_requests(choice, verified));
+        let beyond = verified.and_then(|verified| warn::beyond_stated(&self.stated_error, verified));
+        self.warnings.extend(missed.chain(beyond).collect::<Vec<_>>());
         self.warnings = Warning::fold(self.warnings);
         self
     }

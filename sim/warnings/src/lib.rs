@@ -118,6 +118,8 @@ codes! {
     NearPlaneCuts = "near-plane-cuts" in Simulator,
     /// The timing level is 8 % or more off `stepped` on parts of a frame.
     TimingInaccurate = "timing-inaccurate" in Simulator,
+    /// `--verify` finds a larger error than the run states.
+    StatedErrorExceeded = "stated-error-exceeded" in Simulator,
     /// An interval of `--timing sampled` is wider than 5 % of its value either way.
     WidePredictionInterval = "wide-prediction-interval" in Simulator,
     /// A preview of `--timing sampled` takes half of a frame's cycles or more.

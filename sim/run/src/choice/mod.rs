@@ -177,7 +177,7 @@ fn memory(level: Level) -> &'static str {
 }
 
 /// Actual relative errors of a run, compared with `stepped` frame by frame.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Verified {
     /// Error of the sum of cycles.
     pub cycles_error: f64,

@@ -7,13 +7,14 @@ use std::collections::BTreeMap;
 use activity::{Counts, Event};
 use output::table::si;
 use power_model::{PacedFrame, PacedRun};
+use timing::error_size;
 use traces::frames::Flag;
 use warnings::{Code, Warning};
 
 use self::regimes::of_regimes;
 use crate::heat::HeatPicture;
 use crate::measure::MIN_BUSY_SAMPLES;
-use crate::{Choice, Measurement, Observed, Plan, RunFrame, Simulated, Verified};
+use crate::{CONFIDENCE, Choice, Measurement, Observed, Plan, RunFrame, Simulated, StatedError, Verified};
 
 /// All warnings of a run, sorted, without duplicates.
 pub(crate) fn gather(plan: &Plan, simulated: &Simulated, measurement: &Measurement) -> Vec<Warning> {
@@ -192,6 +193,28 @@ fn actual_error(accuracy: f64, [expected, actual]: [f64; 2]) -> Option<Warning> 
     (actual > accuracy).then(|| Warning::new(Code::AccuracyMissed, message))
 }
 
+/// A warning if the actual errors of cycles or energy are larger than the stated ones, as they are in up to one run in
+/// twenty.
+pub(crate) fn beyond_stated(stated: &StatedError, actual: &Verified) -> Option<Warning> {
+    let pairs =
+        [("cycles", actual.cycles_error, stated.cycles), ("energy", actual.energy_error, stated.energy)];
+    // Stated errors are factors, so that a fifth too short counts as a quarter.
+    let is_beyond = |&(_, actual, stated): &(&str, f64, f64)| error_size(libm::log1p(actual)) > stated;
+    let parts: Vec<_> = pairs
+        .into_iter()
+        .filter(is_beyond)
+        .map(|(of, actual, stated)| {
+            format!("{of} {:+.2} % with {:.1} % stated", actual * 100.0, stated * 100.0)
+        })
+        .collect();
+    let message = format!(
+        "the actual error is larger than the stated one, which holds for {:.0} % of runs ({}): use --timing stepped here",
+        CONFIDENCE * 100.0,
+        parts.join(", ")
+    );
+    (!parts.is_empty()).then(|| Warning::new(Code::StatedErrorExceeded, message))
+}
+
 /// Relative half-width in percent above which an interval gives a warning.
 const MAX_HALF_WIDTH_PERCENT: f64 = 5.0;
 
@@ -362,6 +385,21 @@ mod tests {
         assert_eq!(warning.code, Code::AccuracyMissed);
         let message = "the actual error is 13.55 %, more than the 2 % of --accuracy; 0.15 % was expected";
         assert!(warning.message.starts_with(message), "{warning}");
+    }
+
+    #[test]
+    fn an_actual_error_beyond_the_stated_one_is_warned_about() {
+        let stated = StatedError { cycles: 0.25, energy: 0.02 };
+        let off = |cycles_error, energy_error| Verified { cycles_error, energy_error, ..Verified::default() };
+        // A fifth too short: the truth is a quarter longer.
+        assert_eq!(beyond_stated(&stated, &off(-0.19, 0.019)), None);
+        assert_eq!(beyond_stated(&stated, &off(0.24, -0.019)), None);
+        let cycles = beyond_stated(&stated, &off(-0.21, 0.0)).unwrap();
+        assert_eq!(cycles.code, Code::StatedErrorExceeded);
+        assert!(cycles.message.contains("(cycles -21.00 % with 25.0 % stated)"), "{cycles}");
+        let both = beyond_stated(&stated, &off(0.26, 0.03)).unwrap();
+        let says = "(cycles +26.00 % with 25.0 % stated, energy +3.00 % with 2.0 % stated)";
+        assert!(both.message.contains(says), "{both}");
     }
 
     #[test]
