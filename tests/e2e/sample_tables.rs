@@ -122,6 +122,41 @@ fn heat_maps_of_energy_add_up_to_that_of_the_events() {
     }
 }
 
+/// The maps of single passes add up to that of the frame, and each to at most what the summary has for its pass.
+#[test]
+fn heat_maps_of_passes_add_up_to_that_of_the_frame() {
+    let args = ["--size", "48x32", "--samples", "2", "--frames", "0..1", "--heat", "joules"];
+    let summary = quintile().run("deferred", &args).summary();
+    let passes: Vec<(String, f64)> = summary["passes"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|pass| (pass["name"].as_str().unwrap().to_owned(), pass["events_j"].as_f64().unwrap()))
+        .filter(|(name, _)| name != "write back")
+        .collect();
+    assert!(passes.len() > 2, "{passes:?}");
+    let requests: Vec<String> = passes.iter().map(|(name, _)| format!("joules@{name}")).collect();
+    let more = requests.iter().flat_map(|request| ["--heat", request]);
+    let results = quintile().run("deferred", &args.into_iter().chain(more).collect::<Vec<_>>());
+    let placed = |file: &str| {
+        let csv = results.text(&format!("heat/{file}_0000.csv"));
+        csv.lines().skip(1).map(|row| row.rsplit(',').next().unwrap().parse::<f64>().unwrap()).sum::<f64>()
+    };
+    let mut sum_j = 0.0;
+    for (name, events_j) in passes {
+        let file = format!("joules_{}", name.replace(|symbol: char| !symbol.is_alphanumeric(), "-"));
+        let pass_j = placed(&file);
+        assert!(pass_j > 0.0 && pass_j <= events_j * (1.0 + 1e-9), "{name}: {pass_j} of {events_j}");
+        sum_j += pass_j;
+    }
+    assert!((sum_j / placed("joules") - 1.0).abs() < 1e-9, "{sum_j}");
+    let ended = quintile().call(["run", "tiny", "--heat", "joules@sceen"]);
+    assert_eq!(ended.code, Some(2), "{}", ended.stderr);
+    assert!(ended.stderr.contains("frame 0 has no such pass; it has scene"), "{}", ended.stderr);
+    let ended = quintile().call(["run", "tiny", "--heat", "joules@a b", "--heat", "joules@a-b"]);
+    assert!(ended.code == Some(2) && ended.stderr.contains("are both written to"), "{}", ended.stderr);
+}
+
 /// Of a workload, all passes of the size of the image are on one map.
 #[test]
 fn heat_maps_of_workloads_show_all_passes() {

@@ -13,6 +13,8 @@ use crate::geometry::Viewport;
 pub struct HeatMap {
     /// Event.
     pub event: Event,
+    /// The passes of this name alone; `None` for all that the frame does.
+    pub pass: Option<String>,
     /// Fine tiles, row by row, with the events of each tile alone.
     pub tiles: Vec<TileHeat>,
     /// Coarse tiles, row by row, with the events of the coarse tile as a whole.
@@ -24,6 +26,8 @@ pub struct HeatMap {
     pub samples: Vec<u32>,
     /// Events of samples in each fine tile whose pixels are not known.
     spread: Vec<u64>,
+    /// Whether the events of now are those of its passes.
+    is_counting: bool,
     width: u32,
     height: u32,
 }
@@ -88,7 +92,7 @@ impl HeatMap {
         !matches!(event.unit(), Unit::Command | Unit::Setup) && event != Event::VertexInvocations
     }
 
-    fn new(event: Event, spec: &PipelineSpec, viewport: Viewport) -> Self {
+    fn new(event: Event, pass: Option<&str>, spec: &PipelineSpec, viewport: Viewport) -> Self {
         let [width, height] = [viewport.width(), viewport.height()];
         let tiles = |side: u32| {
             let across = width.div_ceil(side);
@@ -102,11 +106,13 @@ impl HeatMap {
         let is_of_samples = SamplesHere::EVENTS.contains(&event);
         Self {
             event,
+            pass: pass.map(str::to_owned),
             tiles: tiles(spec.tile_px),
             coarse: tiles(spec.coarse_tile_px),
             elsewhere: 0,
             samples: if is_of_samples { vec![0; viewport.pixels()] } else { Vec::new() },
             spread: vec![0; tiles(spec.tile_px).len()],
+            is_counting: pass.is_none(),
             width,
             height,
         }
@@ -228,9 +234,27 @@ pub(super) struct FrameHeat {
 }
 
 impl FrameHeat {
-    pub fn new(events: &[Event], spec: &PipelineSpec, viewport: Viewport) -> Self {
-        let maps = events.iter().map(|&event| HeatMap::new(event, spec, viewport)).collect();
-        Self { viewport: Some(viewport).filter(|_| !events.is_empty()), maps }
+    /// The same with more maps, of the passes of one name or of all. All maps of a frame are of one size.
+    pub fn with(
+        mut self,
+        pass: Option<&str>,
+        events: &[Event],
+        spec: &PipelineSpec,
+        viewport: Viewport,
+    ) -> Self {
+        self.maps.extend(events.iter().map(|&event| HeatMap::new(event, pass, spec, viewport)));
+        Self { viewport: Some(viewport).filter(|_| !self.maps.is_empty()), ..self }
+    }
+
+    /// What is added from now on is of a pass of this name, or of none.
+    pub fn begin(&mut self, pass: Option<&str>) {
+        for map in &mut self.maps {
+            map.is_counting = map.pass.is_none() || map.pass.as_deref() == pass;
+        }
+    }
+
+    fn counting(&mut self) -> impl Iterator<Item = &mut HeatMap> {
+        self.maps.iter_mut().filter(|map| map.is_counting)
     }
 
     /// Whether there are maps over images of this size.
@@ -240,7 +264,7 @@ impl FrameHeat {
 
     /// Add a packet of a drawn pass, of images of the size of the maps or of another one.
     pub fn drawn(&mut self, packet: &Packet, is_on_map: bool) {
-        for map in &mut self.maps {
+        for map in self.counting() {
             if is_on_map { map.packet(packet) } else { map.elsewhere += u64::from(packet.counts[map.event]) }
         }
     }
@@ -257,18 +281,18 @@ impl FrameHeat {
             return self.drawn(packet, false);
         }
         let all = parts.iter().map(|(_, share)| share).sum();
-        self.maps.iter_mut().for_each(|map| map.shared(packet, &parts, all));
+        self.counting().for_each(|map| map.shared(packet, &parts, all));
     }
 
     /// Add the tile tests of bin `number` of a pass.
     pub fn tests(&mut self, pass: &Pass<'_>, number: usize, bin: &Bin, log: &BinLog) {
-        self.maps.iter_mut().for_each(|map| map.tests(pass, number, bin, log));
+        self.counting().for_each(|map| map.tests(pass, number, bin, log));
     }
 
     /// Add a packet of a pass over tiles of the caller, of a barrier or of the end of the frame.
     pub fn add(&mut self, packet: &Packet, is_on_map: bool) {
         let is_placed = is_on_map && matches!(packet.kind, PacketKind::Tile | PacketKind::Resolve);
-        for map in &mut self.maps {
+        for map in self.counting() {
             if is_placed { map.tile(packet) } else { map.elsewhere += u64::from(packet.counts[map.event]) }
         }
     }
@@ -279,7 +303,7 @@ impl FrameHeat {
         let range = placement.pixels(block, [map.width, map.height]);
         let parts = map.parts(range);
         let pixels = parts.iter().map(|(_, share)| share).sum();
-        self.maps.iter_mut().for_each(|map| map.shared(packet, &parts, pixels));
+        self.counting().for_each(|map| map.shared(packet, &parts, pixels));
     }
 
     /// The maps.

@@ -139,6 +139,42 @@ fn passes_of_a_frame_add_up_on_one_map() {
     assert_eq!((resolved, passes[4]), (passes[0] + passes[4], 32 * 32));
 }
 
+/// The maps of two passes of different names and what is no pass add up to those of the frame.
+#[test]
+fn maps_of_single_passes_add_up() {
+    let (spec, soup) = (spec(Features::ALL), Soup::new(SoupKind::Moving, 120, 4));
+    let table = SampleTable::low_discrepancy(4, 3, LensShape::Disk).unwrap();
+    let (camera, draws) = (camera(true), [soup.draw(&Plain, Cull::None)]);
+    let viewport = Viewport::new(75, 53).unwrap();
+    let mut gpu = Gpu::without_packets(&spec).unwrap().with_heat(&Event::ALL, viewport);
+    for name in ["near", "far", "none"] {
+        gpu = gpu.with_heat_of_pass(name, &Event::ALL, viewport);
+    }
+    let settings = Settings { spec: &spec, viewport, samples: &table, background: Vec3::ZERO };
+    for name in ["near", "far", "near"] {
+        gpu.draw(&RasterPass::new(&camera, &draws, &settings).named(name)).unwrap();
+    }
+    let report = gpu.finish();
+    let of = |pass: Option<&'static str>| report.heat.iter().filter(move |map| map.pass.as_deref() == pass);
+    for (((all, near), far), none) in
+        of(None).zip(of(Some("near"))).zip(of(Some("far"))).zip(of(Some("none")))
+    {
+        let event = all.event;
+        let passes: Vec<u64> = report.passes.iter().map(|pass| pass.counts()[event]).collect();
+        assert_eq!(
+            [near.total(), far.total(), none.total()],
+            [passes[0] + passes[2], passes[1], 0],
+            "{event:?}"
+        );
+        for (at, tile) in all.tiles.iter().enumerate() {
+            assert_eq!(tile.count, near.tiles[at].count + far.tiles[at].count, "{event:?}");
+        }
+        let outside = all.elsewhere - near.elsewhere - far.elsewhere;
+        assert_eq!(outside, report.write_back[event], "{event:?}");
+    }
+    assert_eq!(of(None).count(), Event::ALL.len());
+}
+
 /// Farthest depths are gathered where they are in the image, also over tiles of another size than those of the
 /// hardware and at the borders of the image, and nowhere in an image of another size.
 #[test]

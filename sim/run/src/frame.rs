@@ -22,7 +22,7 @@ use workloads::{Fingerprint, Job, Regime};
 
 use crate::heat::{self, HeatPicture};
 use crate::passes::{self, WRITE_BACK, timed_j};
-use crate::{GpuSpec, Observed, Origin, Plan, RunError, RunFrame};
+use crate::{GpuSpec, HeatRequest, Observed, Origin, Plan, RunError, RunFrame};
 
 /// Largest number of bins of all frames, at about 200 bytes each. Longer runs use longer bins.
 const MAX_TOTAL_BINS: usize = 8_000_000;
@@ -144,8 +144,11 @@ pub(crate) fn draw<'a>(
     stop: Option<&'a Cell<bool>>,
     emit: impl FnMut(&Packet, &[LineAccess]) + 'a,
 ) -> Result<(DrawnFrame, Pictures), RunError> {
-    let (ready, events) = (plan.job.prepare(number)?, heat::events(&plan.options.heat));
-    let (drawn, mut report) = draw_on(&plan.gpu, Some((&events, plan.viewport)), &*ready, stop, emit)?;
+    let (ready, requests) = (plan.job.prepare(number)?, &plan.options.heat);
+    let (drawn, mut report) = draw_on(&plan.gpu, Some((requests, plan.viewport)), &*ready, stop, emit)?;
+    if stop.is_none_or(|stop| !stop.get()) {
+        heat::check_passes(requests, &report, number)?;
+    }
     let Drawn { image, moving, lens, facts, warnings } = drawn;
     let heat = std::mem::take(&mut report.heat);
     passes::limit_draws(&mut report);
@@ -265,18 +268,18 @@ impl PassEnergy {
 /// Largest number of bins of a frame.
 const MAX_BINS: usize = 4096;
 
-/// Draws a frame on the pipeline of `gpu`, with heat maps of some events over images of a size, and emits its
+/// Draws a frame on the pipeline of `gpu`, with the heat maps that are requested over images of a size, and emits its
 /// packets, until `stop` is set.
 pub(crate) fn draw_on<'a>(
     gpu: &'a GpuSpec,
-    heat: Option<(&[Event], Viewport)>,
+    heat: Option<(&[HeatRequest], Viewport)>,
     ready: &dyn ReadyFrame,
     stop: Option<&'a Cell<bool>>,
     emit: impl FnMut(&Packet, &[LineAccess]) + 'a,
 ) -> Result<(Drawn, FrameReport), RunError> {
     let mut on = Gpu::new(&gpu.pipeline, emit)?;
-    if let Some((events, viewport)) = heat {
-        on = on.with_heat(events, viewport);
+    if let Some((requests, viewport)) = heat {
+        on = heat::with_maps(on, requests, viewport);
     }
     if let Some(stop) = stop {
         on = on.stopping(stop);

@@ -4,8 +4,9 @@ use activity::Event;
 use glam::Vec3;
 use pipeline::frame::{HeatMap, TileHeat};
 use pipeline::texture::LUMINANCE;
+use pipeline::{FrameReport, Gpu, Viewport};
 
-use super::{HeatQuantity, Plan, RunError};
+use super::{HeatQuantity, HeatRequest, Plan, RunError};
 use output::OutDir;
 use output::dir::BoxError;
 use output::image::LinearImage;
@@ -14,8 +15,8 @@ use output::table::{grouped, si};
 
 /// Heat map of the report.
 pub struct HeatPicture {
-    /// Quantity of the map.
-    pub of: HeatQuantity,
+    /// What the map shows.
+    pub of: HeatRequest,
     /// Number of the frame.
     pub frame: u32,
     /// Share of the quantity that has a place in the image; 0 where there is none at all.
@@ -24,22 +25,49 @@ pub struct HeatPicture {
     pub png: Vec<u8>,
 }
 
-/// Path of the files of a heat map, without extension.
-pub(super) fn heat_name(of: HeatQuantity, frame: u32) -> String {
-    format!("heat/{}_{frame:04}", of.name())
+/// The GPU with the maps that `requests` need.
+pub(super) fn with_maps<'g>(mut gpu: Gpu<'g>, requests: &[HeatRequest], viewport: Viewport) -> Gpu<'g> {
+    let mut passes: Vec<_> = requests.iter().map(|request| request.pass.as_deref()).collect();
+    passes.sort_unstable();
+    passes.dedup();
+    for pass in passes {
+        let events =
+            events(requests.iter().filter(|of| of.pass.as_deref() == pass).map(|request| request.of));
+        gpu = match pass {
+            Some(pass) => gpu.with_heat_of_pass(pass, &events, viewport),
+            None => gpu.with_heat(&events, viewport),
+        };
+    }
+    gpu
 }
 
 /// Events that have to be counted by place. Energy needs all of them.
-pub(super) fn events(quantities: &[HeatQuantity]) -> Vec<Event> {
-    let mut events = Vec::new();
-    for quantity in quantities {
-        let needed = match quantity {
-            HeatQuantity::Event(event) => std::slice::from_ref(event),
-            HeatQuantity::Joules => &Event::ALL[..],
-        };
-        events.extend(needed.iter().filter(|event| !events.contains(*event)).copied().collect::<Vec<_>>());
-    }
-    events
+fn events(quantities: impl Iterator<Item = HeatQuantity>) -> Vec<Event> {
+    let needed: Vec<Event> = quantities
+        .flat_map(|quantity| match quantity {
+            HeatQuantity::Event(event) => vec![event],
+            HeatQuantity::Joules => Event::ALL.to_vec(),
+        })
+        .collect();
+    Event::ALL.into_iter().filter(|event| needed.contains(event)).collect()
+}
+
+/// Checks that a frame has the passes that `requests` name.
+///
+/// # Errors
+/// [`RunError::Setting`] with the names of its passes.
+pub(super) fn check_passes(
+    requests: &[HeatRequest],
+    report: &FrameReport,
+    frame: u32,
+) -> Result<(), RunError> {
+    let mut names: Vec<&str> = report.passes.iter().map(|pass| &*pass.name).collect();
+    let missing = requests.iter().find(|of| of.pass.as_deref().is_some_and(|pass| !names.contains(&pass)));
+    let Some(missing) = missing else { return Ok(()) };
+    names.sort_unstable();
+    names.dedup();
+    let why = format!("`{missing}`: frame {frame} has no such pass; it has {}", names.join(", "));
+    Err(RunError::invalid("heat", why))
 }
 
 /// Writes the heat maps of a frame, made of the `maps` of its events: as PNG, as EXR (values of pixels) and
@@ -52,25 +80,22 @@ pub(super) fn write_all(
     image: &[Vec3],
 ) -> Result<Vec<HeatPicture>, RunError> {
     let brightness = if plan.options.heat.is_empty() { Vec::new() } else { brightness(image) };
-    let write = |&of: &HeatQuantity| {
-        let heat = match of {
+    let write = |request: &HeatRequest| {
+        let maps = maps.iter().filter(|map| map.pass == request.pass);
+        let weighted: Vec<_> = match request.of {
             HeatQuantity::Event(event) => {
-                let map = maps.iter().find(|map| map.event == event);
-                map.map(|map| Heat::new(of, &[(map, 1.0)]))
+                maps.filter(|map| map.event == event).map(|map| (map, 1.0)).collect()
             }
-            HeatQuantity::Joules => {
-                let joules: Vec<_> = maps.iter().map(|map| (map, plan.model.event_j(map.event))).collect();
-                Some(Heat::new(of, &joules))
-            }
+            HeatQuantity::Joules => maps.map(|map| (map, plan.model.event_j(map.event))).collect(),
         };
-        heat.map(|heat| heat.write(plan, dir, frame, &brightness))
+        Heat::new(request.clone(), &weighted).write(plan, dir, frame, &brightness)
     };
-    plan.options.heat.iter().filter_map(write).collect()
+    plan.options.heat.iter().map(write).collect()
 }
 
 /// Values of a quantity over the image: events, or joules.
 struct Heat {
-    of: HeatQuantity,
+    request: HeatRequest,
     /// Fine tiles, and coarse tiles with what belongs to none of their fine tiles.
     tiles: Vec<ValueTile>,
     coarse: Vec<ValueTile>,
@@ -98,7 +123,7 @@ impl ValueTile {
 
 impl Heat {
     /// Sum of maps, each times a weight. The maps are of one image.
-    fn new(of: HeatQuantity, maps: &[(&HeatMap, f64)]) -> Self {
+    fn new(request: HeatRequest, maps: &[(&HeatMap, f64)]) -> Self {
         let sum = |pick: fn(&HeatMap) -> &[TileHeat]| {
             let mut tiles: Vec<ValueTile> = Vec::new();
             for &(map, weight) in maps {
@@ -118,7 +143,7 @@ impl Heat {
             pixels.iter_mut().zip(values).for_each(|(sum, value)| *sum += f64::from(value) * weight);
         }
         Self {
-            of,
+            request,
             tiles: sum(|map| &map.tiles),
             coarse: sum(|map| &map.coarse),
             pixels: pixels.into_iter().map(|value| value as f32).collect(),
@@ -135,7 +160,7 @@ impl Heat {
         frame: u32,
         brightness: &[f32],
     ) -> Result<HeatPicture, RunError> {
-        let name = heat_name(self.of, frame);
+        let name = self.request.path(frame);
         let png = self.picture(plan, frame, brightness).png()?;
         dir.write_file(&format!("{name}.png"), |out| Ok(out.write_all(&png)?))?;
         let pixels: Vec<[f32; 3]> = self.pixels.iter().map(|&value| [value; 3]).collect();
@@ -144,13 +169,19 @@ impl Heat {
         dir.write_file(&format!("{name}.csv"), |out| self.table(out))?;
         // A quantity that is 0 has no part outside the image.
         let placed = if self.total > 0.0 { 1.0 - self.elsewhere / self.total } else { 1.0 };
-        Ok(HeatPicture { of: self.of, frame, placed, png })
+        Ok(HeatPicture { of: self.request.clone(), frame, placed, png })
+    }
+
+    /// What is shown, for titles.
+    fn subject(&self) -> String {
+        let name = self.request.of.name();
+        self.request.pass.as_ref().map_or_else(|| name.to_owned(), |pass| format!("{name} of pass {pass}"))
     }
 
     fn picture(&self, plan: &Plan, frame: u32, brightness: &[f32]) -> Picture {
         let side = if self.is_by_pixel { block_px(self.pixels.len()) } else { plan.gpu.pipeline.tile_px };
         let spread = if side == 1 { String::new() } else { format!(", the mean over {side}x{side} pixels") };
-        let shown = |value: f64| match self.of {
+        let shown = |value: f64| match self.request.of {
             HeatQuantity::Event(_) => grouped(value as u64),
             HeatQuantity::Joules => si(value, "J"),
         };
@@ -159,9 +190,9 @@ impl Heat {
             value => format!(", of which {} happened nowhere in the image", shown(value)),
         };
         let plot = HeatMapPlot {
-            title: &format!("{} per pixel, frame {frame}{spread}", self.of.name()),
+            title: &format!("{} per pixel, frame {frame}{spread}", self.subject()),
             subject: &format!("{} on {}: {} in all{elsewhere}", plan.name, plan.gpu.name, shown(self.total)),
-            label: match self.of {
+            label: match self.request.of {
                 HeatQuantity::Event(_) => "events per pixel",
                 HeatQuantity::Joules => "joules per pixel",
             },
@@ -208,11 +239,11 @@ impl Heat {
     /// Writes the value of each fine tile, then of each coarse tile that has events of its own.
     fn table(&self, out: &mut dyn std::io::Write) -> Result<(), BoxError> {
         let mut table = csv::Writer::from_writer(out);
-        let column = if self.of == HeatQuantity::Joules { "energy_J" } else { "count" };
+        let column = if self.request.of == HeatQuantity::Joules { "energy_J" } else { "count" };
         table.write_record(["x_px", "y_px", "width_px", "height_px", column])?;
         let coarse = self.coarse.iter().filter(|tile| tile.value > 0.0);
         for ValueTile { origin: [x, y], size: [width, height], value } in self.tiles.iter().chain(coarse) {
-            match self.of {
+            match self.request.of {
                 HeatQuantity::Event(_) => table.serialize((x, y, width, height, *value as u64))?,
                 HeatQuantity::Joules => table.serialize((x, y, width, height, value))?,
             }

@@ -66,7 +66,7 @@ pub use gpu::{GpuError, GpuSpec, PowerFiles};
 pub use hardware::{scaling, structure};
 pub use heat::HeatPicture;
 pub use measure::{Checks, Measurement, Resolution};
-pub use options::{Change, HeatQuantity, PacingChoice, Requested, RunOptions, Sampling};
+pub use options::{Change, HeatQuantity, HeatRequest, PacingChoice, Requested, RunOptions, Sampling};
 pub use passes::{PassSummary, StallShares, WorkSummary, passes_of};
 pub use plan::{Plan, fits_memory, refuse_beside_images};
 pub use provenance::{HardwareSummary, Host, Input, Provenance, again, area_mm2};

@@ -1,5 +1,6 @@
 //! Options of a run.
 
+use std::fmt;
 use std::path::{Path, PathBuf};
 
 use activity::Event;
@@ -46,8 +47,8 @@ pub struct Change {
     pub value: String,
 }
 
-impl std::fmt::Display for Change {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+impl fmt::Display for Change {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}={}", self.path, self.value)
     }
 }
@@ -70,8 +71,7 @@ impl Requested {
 }
 
 /// Quantity of a heat map.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(into = "&'static str", try_from = "String")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum HeatQuantity {
     /// Counts of an event.
     Event(Event),
@@ -95,17 +95,59 @@ impl HeatQuantity {
     }
 }
 
-impl From<HeatQuantity> for &'static str {
-    fn from(quantity: HeatQuantity) -> Self {
-        quantity.name()
+/// A heat map of each frame: `joules`, or `joules@shade` for the passes of a name alone.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(into = "String", try_from = "String")]
+pub struct HeatRequest {
+    /// Quantity.
+    pub of: HeatQuantity,
+    /// Name of the passes; `None` for the whole frame.
+    pub pass: Option<String>,
+}
+
+impl HeatRequest {
+    /// Names of quantity and passes in a text.
+    pub fn split(text: &str) -> (&str, Option<&str>) {
+        text.split_once('@').map_or((text, None), |(of, pass)| (of, Some(pass)))
+    }
+
+    /// Path of the files of frame `frame` in a results folder, without extension.
+    pub(crate) fn path(&self, frame: u32) -> String {
+        let name = self.of.name();
+        match &self.pass {
+            Some(pass) => {
+                let pass = pass.replace(|symbol: char| !symbol.is_alphanumeric(), "-");
+                format!("heat/{name}_{pass}_{frame:04}")
+            }
+            None => format!("heat/{name}_{frame:04}"),
+        }
     }
 }
 
-impl TryFrom<String> for HeatQuantity {
+impl fmt::Display for HeatRequest {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let name = self.of.name();
+        match &self.pass {
+            Some(pass) => write!(f, "{name}@{pass}"),
+            None => f.write_str(name),
+        }
+    }
+}
+
+impl From<HeatRequest> for String {
+    fn from(request: HeatRequest) -> Self {
+        request.to_string()
+    }
+}
+
+impl TryFrom<String> for HeatRequest {
     type Error = String;
 
-    fn try_from(name: String) -> Result<Self, String> {
-        Self::all().find(|quantity| quantity.name() == name).ok_or(format!("no heat map of `{name}`"))
+    fn try_from(text: String) -> Result<Self, String> {
+        let (name, pass) = Self::split(&text);
+        let of = HeatQuantity::all().find(|quantity| quantity.name() == name);
+        let of = of.ok_or_else(|| format!("no heat map of `{name}`"))?;
+        Ok(Self { of, pass: pass.map(str::to_owned) })
     }
 }
 
@@ -155,8 +197,8 @@ pub struct RunOptions {
     pub seed: u64,
     /// Whether images are also written as EXR.
     pub exr: bool,
-    /// Quantities of the heat maps.
-    pub heat: Vec<HeatQuantity>,
+    /// Heat maps.
+    pub heat: Vec<HeatRequest>,
     /// Width, title and font size of plots.
     pub plot_style: PlotStyle,
 }

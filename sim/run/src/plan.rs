@@ -15,7 +15,7 @@ use crate::RunError;
 use crate::changes::{ChangedFile, Changes, InputFile};
 use crate::gpu::{GpuSpec, check_pairing};
 use crate::hardware;
-use crate::options::{Change, DEFAULT_RATE_HZ, PacingChoice, Requested, RunOptions};
+use crate::options::{Change, DEFAULT_RATE_HZ, HeatRequest, PacingChoice, Requested, RunOptions};
 
 /// Plan of a run: options, and all inputs loaded and checked.
 ///
@@ -85,6 +85,7 @@ impl Plan {
         load_job: impl FnOnce(&RunOptions, &mut Changes<'_>) -> Result<(String, Arc<dyn Job>), RunError>,
     ) -> Result<Self, RunError> {
         check_recorder(&options)?;
+        check_heat(&options.heat)?;
         if options.timing.is_none() {
             check_images(&options)?;
         }
@@ -233,6 +234,19 @@ fn check_recorder(options: &RunOptions) -> Result<(), RunError> {
         let loss = options.packet_loss;
         let why = format!("{loss}; a share from 0 to below 1 can be lost");
         return Err(RunError::invalid("packet loss", why));
+    }
+    Ok(())
+}
+
+/// Checks that no two heat maps are of one file.
+fn check_heat(requests: &[HeatRequest]) -> Result<(), RunError> {
+    for (at, request) in requests.iter().enumerate() {
+        let path = request.path(0);
+        if let Some(other) = requests[..at].iter().find(|other| other.path(0) == path) {
+            let why =
+                format!("`{other}` and `{request}` are both written to {path}.png; ask for one of them");
+            return Err(RunError::invalid("heat", why));
+        }
     }
     Ok(())
 }

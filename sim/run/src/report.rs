@@ -19,7 +19,6 @@ use workloads::scene::CameraUsed;
 
 use crate::dry_run::area_text;
 use crate::frame::image_name;
-use crate::heat::heat_name;
 use crate::passes::{stall_picture, waited_for};
 use crate::summary::SettingsSummary;
 use crate::{FinishedRun, HeatQuantity, Host, Input, PassSummary, Plan, RunError, RunFrame, WorkSummary};
@@ -88,14 +87,20 @@ pub(super) fn images(plan: &Plan, pictures: &[(u32, Vec<Vec3>)]) -> Result<Vec<R
 
 fn heat(outcome: &FinishedRun) -> impl Iterator<Item = ReportImage> {
     outcome.simulated.heat.iter().map(|map| ReportImage {
-        caption: match map.of {
-            HeatQuantity::Event(event) => {
-                format!("where in frame {} the counter {} counted", map.frame, event.name())
+        caption: {
+            let place = match &map.of.pass {
+                Some(pass) => format!("pass {pass} of frame {}", map.frame),
+                None => format!("frame {}", map.frame),
+            };
+            match map.of.of {
+                HeatQuantity::Event(event) => {
+                    format!("where in {place} the counter {} counted", event.name())
+                }
+                HeatQuantity::Joules => format!("where in {place} the energy of events was used"),
             }
-            HeatQuantity::Joules => format!("where in frame {} the energy of events was used", map.frame),
         },
         png: map.png.clone(),
-        link: Some(format!("{}.png", heat_name(map.of, map.frame))),
+        link: Some(format!("{}.png", map.of.path(map.frame))),
     })
 }
 

@@ -11,7 +11,6 @@ use traces::io::perfetto::{
 };
 
 use crate::frame::image_name;
-use crate::heat::heat_name;
 use crate::passes::{WRITE_BACK, stall_tracks, take_turns};
 use crate::{FIGURES, FinishedRun, FrameRow, Observed, Plan, RunError, report};
 
@@ -21,7 +20,7 @@ pub(super) fn claim(plan: &Plan) -> Claim {
     let frames = || plan.job.settings().frames.clone();
     let images =
         frames().flat_map(|frame| ends.iter().map(move |end| format!("{}.{end}", image_name(frame))));
-    let maps = plan.options.heat.iter().flat_map(|&of| frames().map(move |frame| heat_name(of, frame)));
+    let maps = plan.options.heat.iter().flat_map(|of| frames().map(move |frame| of.path(frame)));
     let heat = maps.flat_map(|name| ["png", "exr", "csv"].map(|end| format!("{name}.{end}")));
     let figures = FIGURES.map(|(figure, _)| figure).into_iter();
     let changed = plan.changed.iter().map(|changed| changed.file.result());

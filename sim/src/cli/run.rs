@@ -13,8 +13,8 @@ use output::terminal::{Progress, Terminal, Verbosity};
 use output::{Destination, MeanSd};
 use power_model::Bound;
 use run::{
-    Choice, DryRun, FinishedRun, HeatQuantity, PacingChoice, Plan, Prepared, Requested, RunError, RunOptions,
-    Sampling, Summary, again, open, prepare, refuse_beside_images,
+    Choice, DryRun, FinishedRun, HeatQuantity, HeatRequest, PacingChoice, Plan, Prepared, Requested,
+    RunError, RunOptions, Sampling, Summary, again, open, prepare, refuse_beside_images,
 };
 use serde::Serialize;
 use timing::Level;
@@ -112,9 +112,9 @@ pub struct RunArgs {
     #[arg(long)]
     pub exr: bool,
     /// Write heat maps of a counter, or of the energy of all counters (joules), as PNG, EXR and CSV in heat/;
-    /// may be given several times
-    #[arg(long, value_name = "COUNTER|joules", value_parser = quantity)]
-    pub heat: Vec<HeatQuantity>,
+    /// with @PASS those of the passes of that name alone; may be given several times
+    #[arg(long, value_name = "COUNTER|joules[@PASS]", value_parser = heat)]
+    pub heat: Vec<HeatRequest>,
     /// Worker threads.
     #[command(flatten)]
     pub threads: ThreadArgs,
@@ -229,11 +229,12 @@ pub(super) fn check_given(matches: &ArgMatches) -> Result<(), RunError> {
     refuse_beside_images(&given.map(|id| format!("--{}", id.replace('_', "-"))).collect::<Vec<_>>())
 }
 
-/// Parser of `--heat`: energy, or a counter that has a position in the image.
-fn quantity(text: &str) -> Result<HeatQuantity, String> {
-    if let Some(known) = HeatQuantity::all().find(|quantity| quantity.name() == text) {
+/// Parser of `--heat`: energy, or a counter that has a position in the image; of all passes or those of a name.
+fn heat(text: &str) -> Result<HeatRequest, String> {
+    if let Ok(known) = HeatRequest::try_from(text.to_owned()) {
         return Ok(known);
     }
+    let (text, _) = HeatRequest::split(text);
     if Event::from_name(text).is_some() {
         return Err(format!(
             "`{text}` is counted before it is known where in the image; samples_tested is not"

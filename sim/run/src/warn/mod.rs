@@ -141,7 +141,7 @@ fn heat_outside_image(simulated: &Simulated) -> Vec<Warning> {
         let message = format!(
             "the heat map of {} shows {:.1} % of it (frame {}): the rest has no place in the image, because its passes are of \
              another size; choose another quantity",
-            worst.of.name(),
+            worst.of,
             1e2 * worst.placed,
             worst.frame
         );
@@ -349,7 +349,7 @@ fn lost(measurement: &Measurement) -> Option<Warning> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{HeatQuantity, RunQuantity, SampledSummary};
+    use crate::{HeatQuantity, HeatRequest, RunQuantity, SampledSummary};
 
     #[test]
     fn starts_off_by_more_than_half_of_their_frame_are_warned_about() {
@@ -447,7 +447,10 @@ mod tests {
     fn each_heat_map_that_shows_next_to_nothing_has_one_warning() {
         let [hits, madds, reads] =
             [Event::SamplesHit, Event::TileMadds, Event::DepthReads].map(HeatQuantity::Event);
-        let picture = |(of, frame, placed)| HeatPicture { of, frame, placed, png: Vec::new() };
+        let picture = |(of, frame, placed)| {
+            let of = HeatRequest { of, pass: None };
+            HeatPicture { of, frame, placed, png: Vec::new() }
+        };
         let heat = [(hits, 3, 0.05), (madds, 3, 0.0), (reads, 3, 0.9), (hits, 4, 0.01), (madds, 4, 0.5)];
         let heat = heat.map(picture).into();
         let (distinct, pictures) = Default::default();
