@@ -100,7 +100,9 @@ pub enum ComputeError {
         groups: [u32; 3],
     },
     /// A group is empty or too large.
-    #[error("a group of {lanes} lanes; the GPU runs groups of 1 to {most}")]
+    #[error(
+        "a group of {lanes} lanes; the GPU runs groups of 1 to {most}: raise `pipeline.compute.group_lanes` in its file"
+    )]
     Lanes {
         /// Lanes of a group.
         lanes: u32,
@@ -108,7 +110,10 @@ pub enum ComputeError {
         most: u32,
     },
     /// A group has too much shared memory.
-    #[error("{bytes} bytes of shared memory; the GPU gives a group up to {most}, in words of 4")]
+    #[error(
+        "{bytes} bytes of shared memory; the GPU gives a group up to {most}, in words of 4: raise \
+         `pipeline.compute.shared_bytes` in its file"
+    )]
     Shared {
         /// Bytes of a group.
         bytes: u32,

@@ -258,9 +258,9 @@ pub enum PassError {
     },
     /// The surfaces of a frame are too large.
     #[error(
-        "pass `{pass}`: the surfaces of the frame take {bytes} bytes, more than the {} that can be addressed; draw fewer pixels, \
-         samples or passes",
-        AddressSpace::END
+        "pass `{pass}`: the surfaces of the frame take {} GiB, more than {} GiB; draw fewer pixels, samples or passes",
+        .bytes.div_ceil(1 << 30),
+        AddressSpace::MAX_BYTES >> 30
     )]
     Memory {
         /// The pass that does not fit.

@@ -191,7 +191,7 @@ impl Gpu<'_> {
 }
 
 impl ConservativePass {
-    /// Draws triangles with `shader`. `store` is given every result, with the column and row of its tile.
+    /// Draws triangles with `shader`, as one draw of the pass. `store` is given every result, with the column and row of its tile.
     pub fn draw<S: TileShader>(
         &mut self,
         gpu: &mut Gpu<'_>,
@@ -201,6 +201,7 @@ impl ConservativePass {
     ) {
         let (first, warp_lanes) = (gpu.triangles_of_pass() as u32, gpu.spec().warp_lanes);
         let numbers = numbered(draw.primitives, first);
+        gpu.next_draw();
         vertices(gpu, draw, self.workers.worker().lanes.costs());
         for (chunk, from) in chunks(draw.primitives) {
             if gpu.is_stopped() {

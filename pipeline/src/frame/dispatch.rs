@@ -171,6 +171,7 @@ impl Gpu<'_> {
         viewport: Viewport,
         pixel: impl Fn(&Lanes, [u32; 2]) -> T + Sync,
     ) -> Vec<T> {
+        self.end_draws();
         let (side, warp_lanes) = (self.spec().tile_px, self.spec().warp_lanes);
         let columns: Vec<u32> = (0..viewport.width()).step_by(side as usize).collect();
         let mut values = vec![T::default(); viewport.pixels()];
@@ -228,7 +229,7 @@ impl Gpu<'_> {
         let of = triangle.unwrap_or((self.triangles_of_pass() as u32).saturating_sub(1));
         Packet {
             batch: of / self.spec().batch_triangles,
-            draw: 0,
+            draw: self.draw_of_packets(),
             tile,
             triangle: triangle.unwrap_or(Packet::NONE),
             ..Packet::new(kind, self.last_pass())

@@ -46,6 +46,8 @@ pub struct Gpu<'e> {
     is_on_map: bool,
     /// Where other tiles of the pass that was begun are on the heat maps, if anywhere.
     placement: Option<Placement>,
+    /// The draw that was begun in the pass that was begun.
+    draw: Option<u32>,
     /// Whether packets are made wherever a pass can be drawn without them, too.
     is_counted: bool,
     /// Set once the rest of the frame is not needed.
@@ -180,6 +182,7 @@ impl<'e> Gpu<'e> {
             heat,
             is_on_map: false,
             placement: None,
+            draw: None,
             is_counted: true,
             stop: None,
         })
@@ -189,7 +192,13 @@ impl<'e> Gpu<'e> {
     /// size have no position.
     #[must_use]
     pub fn with_heat(self, events: &[Event], viewport: Viewport) -> Self {
-        Self { heat: FrameHeat::new(events, self.spec, viewport), ..self }
+        Self { heat: self.heat.with(None, events, self.spec, viewport), ..self }
+    }
+
+    /// The same of the passes of one name alone.
+    #[must_use]
+    pub fn with_heat_of_pass(self, pass: &str, events: &[Event], viewport: Viewport) -> Self {
+        Self { heat: self.heat.with(Some(pass), events, self.spec, viewport), ..self }
     }
 
     /// The GPU, which draws no further once `stop` is set, for example by the code that receives its packets. Raster
@@ -274,10 +283,31 @@ impl<'e> Gpu<'e> {
 
     /// Starts a pass whose packets have no place in an image.
     pub(super) fn start(&mut self, report: PassReport) {
+        self.heat.begin(Some(&report.name));
         self.passes.push(report);
         self.last_batch = 0;
         self.is_on_map = false;
         self.placement = None;
+        self.draw = None;
+    }
+
+    /// Begins the next draw of a pass that was begun. Returns its number.
+    pub(super) fn next_draw(&mut self) -> u32 {
+        let Some(pass) = self.passes.last_mut() else { return 0 };
+        pass.draws.push(Counts::default());
+        let number = pass.draws.len() as u32 - 1;
+        self.draw = Some(number);
+        number
+    }
+
+    /// What follows in the pass is of no single draw.
+    pub(super) fn end_draws(&mut self) {
+        self.draw = None;
+    }
+
+    /// The draw that packets are of. A pass without draws is as one of a single draw.
+    pub(super) fn draw_of_packets(&self) -> u32 {
+        self.draw.unwrap_or(if self.draws_of_pass().is_empty() { 0 } else { Packet::NONE })
     }
 
     /// Whether a pass that reads or writes `region` has to wait for earlier ones.
@@ -300,7 +330,7 @@ impl<'e> Gpu<'e> {
         self.reads.push(address);
     }
 
-    /// Checks that the frame goes on, and that all its surfaces have addresses.
+    /// Checks that the frame goes on, and that all its surfaces fit into memory.
     pub(super) fn check_frame(&self, pass: &str) -> Result<(), PassError> {
         if self.is_stopped() {
             return Err(PassError::Stopped { pass: pass.to_owned() });
@@ -505,6 +535,7 @@ impl<'e> Gpu<'e> {
         self.memory.finish(&self.results, &mut counts);
         let packet = Packet { counts, ..Packet::new(PacketKind::Resolve, self.passes.len() as u32) };
         (self.emit)(&packet, self.memory.log());
+        self.heat.begin(None);
         self.heat.add(&packet, false);
         let mut write_back = Counts::default();
         write_back += &counts;

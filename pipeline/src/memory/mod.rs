@@ -53,6 +53,8 @@ impl AddressSpace {
     /// End of the addresses of surfaces, vertices and textures. A line has a number of 32 bits; the upper
     /// half is for bins.
     pub const END: u64 = LINE_BYTES << 31;
+    /// Most bytes of a frame. This program keeps the contents of all surfaces, too.
+    pub const MAX_BYTES: u64 = 8 << 30;
 
     /// A new surface of `bytes`.
     pub fn take(&mut self, bytes: u64) -> MemoryRange {
@@ -71,9 +73,9 @@ impl AddressSpace {
         new
     }
 
-    /// Whether all surfaces have addresses.
+    /// Whether all surfaces fit into memory.
     pub fn fits(&self) -> bool {
-        self.next <= Self::END
+        self.next <= Self::MAX_BYTES
     }
 
     /// Bytes handed out.
@@ -272,9 +274,10 @@ mod tests {
     }
 
     #[test]
-    fn addresses_end_where_line_numbers_do() {
+    fn a_frame_takes_no_more_than_memory_has() {
+        const { assert!(AddressSpace::MAX_BYTES <= AddressSpace::END) };
         let mut space = AddressSpace::default();
-        space.take(AddressSpace::END);
+        space.take(AddressSpace::MAX_BYTES);
         assert!(space.fits());
         space.take(1);
         assert!(!space.fits());

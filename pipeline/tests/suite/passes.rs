@@ -157,7 +157,7 @@ fn a_frame_that_is_too_large_names_its_pass() {
     let draws = [soup.draw(&Plain, Cull::None)];
     with(|settings| {
         let mut gpu = Gpu::without_packets(settings.spec).unwrap();
-        gpu.allocate(memory::AddressSpace::END);
+        gpu.allocate(memory::AddressSpace::MAX_BYTES);
         let camera = camera(false);
         let error = gpu.draw(&RasterPass::new(&camera, &draws, settings).named("shadow")).unwrap_err();
         assert!(error.to_string().starts_with("pass `shadow`: the surfaces of the frame take "), "{error}");

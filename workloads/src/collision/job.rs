@@ -259,6 +259,28 @@ mod tests {
         }
     }
 
+    /// Every object has vertices of its own, and each of its draws its own counts.
+    #[test]
+    fn every_object_is_read_from_memory() {
+        let read = |balls: &str| {
+            let job = made(&[("resolution", "4"), ("balls", balls)]).unwrap();
+            let hardware = hardware();
+            let mut gpu = Gpu::new(&hardware, |_: &Packet, _| ()).unwrap();
+            job.frame(0, &mut gpu).unwrap();
+            let report = gpu.finish();
+            for pass in &report.passes {
+                let draws: u64 = pass.draws.iter().map(|draw| draw[Event::Draws]).sum();
+                assert_eq!(draws, pass.draws.len() as u64, "{}", pass.name);
+            }
+            let first = &report.passes[0];
+            assert!(first.draws.iter().all(|draw| draw[Event::VerticesFetched] > 0));
+            (first.draws.len() as u64, first.counts()[Event::DramReadBytes])
+        };
+        let [(few, few_bytes), (many, many_bytes)] = ["4", "8"].map(read);
+        assert_eq!((few, many), (4, 8));
+        assert!(few_bytes > 0 && many_bytes >= 2 * few_bytes, "{few_bytes} and {many_bytes}");
+    }
+
     #[test]
     fn an_axis_waits_for_the_one_whose_results_the_host_has_read() {
         let job = made(&[("resolution", "16"), ("balls", "6")]).unwrap();

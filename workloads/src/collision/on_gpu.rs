@@ -60,7 +60,9 @@ impl BoxLayout {
 pub(super) struct PassesOnGpu<'a, 'e> {
     gpu: &'a mut Gpu<'e>,
     pass: ConservativePass,
-    vertices: MemoryRange,
+    objects: &'a [Object],
+    /// Vertices of each object.
+    vertices: Vec<MemoryRange>,
     picture: Picture,
     viewport: Viewport,
     layout: BoxLayout,
@@ -83,17 +85,30 @@ impl<'a, 'e> PassesOnGpu<'a, 'e> {
     /// Makes passes with square images of `viewport` and `bins` boxes in a pixel.
     pub fn new(
         (method, viewport, bins): (CollisionMethod, Viewport, u32),
-        objects: &[Object],
+        objects: &'a [Object],
         gpu: &'a mut Gpu<'e>,
     ) -> Self {
         let layout = BoxLayout::new(viewport, gpu.spec().tile_px, bins, method);
-        let most = objects.iter().map(Object::len).max().unwrap_or(0) as u64;
-        let vertices = gpu.allocate(3 * most * u64::from(VERTEX_BYTES));
+        let bytes = |object: &Object| 3 * object.len() as u64 * u64::from(VERTEX_BYTES);
+        let vertices = objects.iter().map(|object| gpu.allocate(bytes(object))).collect();
         let boxes = [(); 2].map(|()| gpu.allocate(layout.bytes()));
         let picture = Picture::new(objects, viewport.width() as usize);
         let answers = gpu.allocate(objects.len() as u64 * ANSWER_BYTES);
         let (pass, answered, fragments) = Default::default();
-        Self { gpu, pass, vertices, picture, viewport, layout, boxes, answers, answered, method, fragments }
+        Self {
+            gpu,
+            pass,
+            objects,
+            vertices,
+            picture,
+            viewport,
+            layout,
+            boxes,
+            answers,
+            answered,
+            method,
+            fragments,
+        }
     }
 
     /// The answers of a pass are in memory when it ends, for the host to read.
@@ -101,6 +116,12 @@ impl<'a, 'e> PassesOnGpu<'a, 'e> {
         if std::mem::take(&mut self.answered) > 0 {
             self.gpu.keep(self.answers);
         }
+    }
+
+    /// Vertices of an object in memory.
+    fn vertices_of(&self, object: &Object) -> Option<MemoryRange> {
+        let at = self.objects.iter().position(|known| std::ptr::eq(known, object))?;
+        self.vertices.get(at).copied()
     }
 
     /// Where the next answer is.
@@ -195,13 +216,15 @@ impl PassBackend for PassesOnGpu<'_, '_> {
         known: Option<&TzBuffer>,
         each: &mut dyn FnMut(&Fragment),
     ) -> bool {
+        // An object that is not in memory is undecided, as one with too many fragments.
+        let Some(vertices) = self.vertices_of(part.object) else { return false };
         let binned = pass.primitives(part, bins);
         let primitives: Vec<Primitive> = binned.iter().map(|binned| binned.primitive.clone()).collect();
         let draw = ConservativeDraw {
             primitives: &primitives,
             grid: pass.grid(),
             block: self.layout.side,
-            vertices: self.vertices,
+            vertices,
             vertex_bytes: VERTEX_BYTES,
             projection: None,
         };
