@@ -23,7 +23,7 @@ struct NotProvoked {
 }
 
 /// Codes without a test here.
-const NOT_PROVOKED: [NotProvoked; 30] = [
+const NOT_PROVOKED: [NotProvoked; 31] = [
     NotProvoked {
         code: "clipped-samples",
         test: "sim/run/src/warn/mod.rs",
@@ -98,7 +98,7 @@ const NOT_PROVOKED: [NotProvoked; 30] = [
 ];
 
 /// Codes that the tests below produce, and `orthographic-view`, which `visibility_inputs` tests.
-const PROVOKED: [&str; 59] = [
+const PROVOKED: [&str; 60] = [
     "accuracy-missed",
     "alpha-ignored",
     "behind-camera",
@@ -108,6 +108,7 @@ const PROVOKED: [&str; 59] = [
     "camera-inside",
     "caustics-coarse",
     "caustics-crossed",
+    "caustics-from-host",
     "coordinates-coarse",
     "coordinates-far-from-origin",
     "coordinates-out-of-range",
@@ -404,7 +405,16 @@ fn a_triangle_without_area() {
 #[test]
 fn an_empty_image() {
     let away = format!("(camera: (position: (0, 0, 5), target: (0, 0, 9)), objects: [{SPHERE}])");
-    assert_warns(&run_file("away.ron", away, &[]), "empty-frame");
+    assert_warns(&run_file("away.ron", &away, &[]), "empty-frame");
+    // Their passes over the whole screen fill the image.
+    let inputs = Inputs::new();
+    let scene = format!("scene={}", inputs.put("away.ron", &away));
+    for (workload, more) in [("deferred", &[][..]), ("soft-shadows", &["--set", "map_px=32"])] {
+        let args = ["--size", "32x18", "--frames", "0..1", "--samples", "2", "--set", &scene];
+        assert_warns(&quintile().run(workload, &[&args[..], more].concat()), "empty-frame");
+        let seen = quintile().run(workload, &[&args[..6], more].concat());
+        assert!(!seen.warning_codes().iter().any(|code| code == "empty-frame"), "{workload}");
+    }
 }
 
 #[test]
@@ -700,6 +710,11 @@ fn light_volumes_with_crossing_sides() {
     let results = quintile().run("caustics", &args);
     assert_warns(&results, "caustics-crossed");
     assert_warns(&results, "caustics-coarse");
+    let args = ["--size", "16x9", "--frames", "0..1", "--set", "cells=8", "--gpu"];
+    let mobile = quintile().run("caustics", &[&args[..], &["mobile"]].concat());
+    assert_warns(&mobile, "caustics-from-host");
+    let reference = quintile().run("caustics", &[&args[..], &["reference"]].concat());
+    assert!(!reference.warning_codes().iter().any(|code| code == "caustics-from-host"));
 }
 
 /// No run samples points in single precision: the warning is that of `quintile sample`.

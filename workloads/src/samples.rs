@@ -68,6 +68,11 @@ impl SampleChoice {
     }
 }
 
+/// Warns if a frame shows nothing of its scene, although passes over the whole screen fill the image.
+pub(crate) fn empty_warning(sees_any: bool) -> Option<Warning> {
+    (!sees_any).then(|| Warning::new(Code::EmptyFrame, "nothing of the scene is in view: check the camera"))
+}
+
 /// Warns if the samples of a pixel do not spread over a dimension that is drawn: time, or the lens. One
 /// sample has no spread and is left out.
 pub(crate) fn blur_warning(samples: &dyn SampleSource, moving: bool, lens: bool) -> Option<Warning> {

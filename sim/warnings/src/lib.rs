@@ -136,6 +136,8 @@ codes! {
     CausticsCoarse = "caustics-coarse" in Workload,
     /// The sides of light volumes cross for more than a tenth of their length on average.
     CausticsCrossed = "caustics-crossed" in Workload,
+    /// The host makes the beams of `caustics`, as the GPU has no compute unit.
+    CausticsFromHost = "caustics-from-host" in Workload,
     /// Nine in ten pairs with touching swept boxes may collide.
     CollisionNearEverywhere = "collision-near-everywhere" in Workload,
     /// A quarter or more of the tiles are covered for most of their samples, but not all.

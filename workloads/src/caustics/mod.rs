@@ -27,7 +27,7 @@ mod refraction;
 mod shader;
 
 use glam::DVec3;
-use pipeline::{Gpu, Lane};
+use pipeline::{Gpu, Lane, PipelineSpec};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use warnings::{Code, Warning};
@@ -171,7 +171,7 @@ impl Draws for Caustics {
             moving: method == BeamMethod::Moving,
             lens: false,
             facts: facts(&picture, &beams),
-            warnings: accuracy_warnings(&self.ocean, &beams),
+            warnings: [accuracy_warnings(&self.ocean, &beams), from_host(gpu.spec())].concat(),
         })
     }
 }
@@ -329,6 +329,13 @@ pub const MIN_SQUARES_PER_WAVE: f64 = 4.0;
 /// Mean share of their length over which sides of beams cross.
 pub fn crossing(beams: &[Beam]) -> f64 {
     beams.iter().map(Beam::crossing).sum::<f64>() / beams.len().max(1) as f64
+}
+
+/// Warning that time and energy lack the passes that make the beams.
+fn from_host(spec: &PipelineSpec) -> Vec<Warning> {
+    let message = "the GPU has no compute unit, so the host makes the beams and no time or energy of the frame is that of refraction; \
+                   give the GPU a `compute` unit to compare it with others";
+    spec.compute.is_none().then(|| Warning::new(Code::CausticsFromHost, message)).into_iter().collect()
 }
 
 /// Warnings about an ocean made of these beams.

@@ -19,7 +19,7 @@ use crate::job::{
     OptionSource, facts, must_hold,
 };
 use crate::material::{PointLight, SurfaceShader};
-use crate::samples::{SampleChoice, blur_warning};
+use crate::samples::{SampleChoice, blur_warning, empty_warning};
 use crate::scene::{Frame, Overrides, Scene};
 use crate::shapes;
 
@@ -191,8 +191,9 @@ impl DrawsScene for Deferred {
         let (lights, screen) = (LightBuffer::new(gpu, &self.lights), Corners::of(frame, viewport));
         let stage = Stage { job: self, frame, viewport, lit, lights, screen };
         let surfaces = stage.surfaces(gpu)?;
-        let lit_runs = match self.options.method {
-            LightingMethod::Forward => stage.forward(&surfaces, gpu)?,
+        // Forward rendering has no pass over the whole screen, so the counters of its frame show if it is empty.
+        let (lit_runs, sees_any) = match self.options.method {
+            LightingMethod::Forward => (stage.forward(&surfaces, gpu)?, true),
             LightingMethod::Deferred => stage.deferred(&surfaces, gpu)?,
         };
         let image = stage.resolve(gpu)?.into_image();
@@ -208,6 +209,7 @@ impl DrawsScene for Deferred {
         let mut warnings = self.regime_warnings(frame);
         let moving = frame.is_moving();
         warnings.extend(blur_warning(&*self.samples, moving, false));
+        warnings.extend(empty_warning(sees_any));
         Ok(Drawn { image, moving, lens: false, facts, warnings })
     }
 }
@@ -316,8 +318,9 @@ impl<'a> Stage<'a> {
         self.pass(name, &draws.collect::<Vec<_>>(), targets, gpu, false)
     }
 
-    /// The G-buffer of opaque surfaces, their light, and blended surfaces over them.
-    fn deferred(&self, surfaces: &[Surfaced<'a>], gpu: &mut Gpu<'_>) -> Result<u64, JobError> {
+    /// The G-buffer of opaque surfaces, their light, and blended surfaces over them. Returns the shader runs of the
+    /// light, and whether any surface is in view.
+    fn deferred(&self, surfaces: &[Surfaced<'a>], gpu: &mut Gpu<'_>) -> Result<(u64, bool), JobError> {
         let (samples, normals) = (self.job.samples.per_pixel(), self.job.options.normals);
         let buffer = GBuffer::new(gpu, self.viewport, samples, normals);
         let (opaque, blended): (Vec<_>, Vec<_>) =
@@ -325,14 +328,14 @@ impl<'a> Stage<'a> {
         let writers: Vec<Writer<'_>> =
             opaque.iter().map(|of| Writer { surface: of.shader, normals }).collect();
         let draws = opaque.iter().zip(&writers).map(|(of, shader)| Draw { shader, ..of.draw });
-        self.pass("g-buffer", &draws.collect::<Vec<_>>(), &buffer.targets(), gpu, false)?;
+        let mut seen = self.pass("g-buffer", &draws.collect::<Vec<_>>(), &buffer.targets(), gpu, false)?;
         let runs = self.light(&buffer, surfaces, gpu)?;
         if !blended.is_empty() {
             let colours = vec![Attachment::loaded(self.lit)];
             let depth = Some(Attachment::loaded(buffer.depth).dropped());
-            self.lit_forward("blended", blended, &Attachments { colours, depth }, gpu)?;
+            seen += self.lit_forward("blended", blended, &Attachments { colours, depth }, gpu)?;
         }
-        Ok(runs)
+        Ok((runs, seen > 0))
     }
 
     /// Lights the G-buffer.

@@ -219,7 +219,8 @@ impl DrawsScene for MultiView {
         if self.options.check_cache {
             let value = runs_over_infinite_cache(&rig, &draws, &to, &views)?;
             facts.extend(Fact::all([(fact::invocations_over_those_with_all_in_cache, value)]));
-            warnings.extend(cache_warning(value, gpu.spec()));
+            // Views that are drawn one by one share nothing, whatever the size of the cache.
+            warnings.extend(cache_warning(value, gpu.spec()).filter(|_| !self.options.view_by_view));
         }
         let (image, moving) = (self.shown(&views), frame.is_moving());
         Ok(Drawn { image, moving, lens: true, facts, warnings })

@@ -18,6 +18,7 @@ use crate::job::{
     Drawn, DrawsScene, Fact, Flag, Flags, Job, JobError, JobOptions, JobRequest, OptionSource, facts,
 };
 use crate::material::{Alpha, Material};
+use crate::samples::empty_warning;
 use crate::scene::{
     self, Frame, FrameMesh, Graph, Local, Motion, Node, Overrides, Parts, Rig, Scene, SceneCamera,
     SceneSettings, Spin, Trs, tan_half,
@@ -194,6 +195,7 @@ impl DrawsScene for SoftShadows {
         let facts = self.facts(&map, shaded.counts[Event::TextureFetches]);
         let mut warnings = self.regime_warnings();
         warnings.extend(self.simplified(frame));
+        warnings.extend(empty_warning(visible.is_any()));
         let moving = frame.is_moving();
         Ok(Drawn { image: shaded.into_image(), moving, lens: true, facts, warnings })
     }

@@ -348,6 +348,11 @@ impl VisibleTriangles {
         Ok(Self { surfaces, width: viewport.width() })
     }
 
+    /// Whether any sample sees one.
+    pub fn is_any(&self) -> bool {
+        self.surfaces.iter().flat_map(|numbers| &numbers.of).any(|&number| number != u32::MAX)
+    }
+
     /// The number of the triangle that a sample of a pixel sees; `u32::MAX` for none.
     pub fn at(&self, [x, y]: [u32; 2], sample: usize) -> u32 {
         let (numbers, sample, count) = self.place(sample);
