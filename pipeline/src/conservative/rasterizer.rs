@@ -74,26 +74,19 @@ pub struct Rasterizer {
     clip: Region,
     halvings: u32,
     in_doubles: bool,
-    has_depths: bool,
 }
 
 impl Rasterizer {
     /// A rasterizer for the whole lens and shutter in `view`, with tests in `f32`; the time of a touched tile
     /// is halved twice.
     pub fn new(view: View) -> Self {
-        Self { view, clip: Region::WHOLE, halvings: 2, in_doubles: false, has_depths: true }
+        Self { view, clip: Region::WHOLE, halvings: 2, in_doubles: false }
     }
 
     /// The rasterizer with tests in `f64`, for tiles smaller than the precision of `f32`.
     #[must_use]
     pub fn in_doubles(self) -> Self {
         Self { in_doubles: true, ..self }
-    }
-
-    /// The rasterizer without depth intervals, for shaders that read none: they are unbounded, and cost nothing.
-    #[must_use]
-    pub fn without_depths(self) -> Self {
-        Self { has_depths: false, ..self }
     }
 
     /// The rasterizer limited to a part of lens and shutter, ends included (user clip planes).
@@ -175,8 +168,7 @@ struct Tests<'a, C> {
     rasterizer: &'a Rasterizer,
     region: &'a Region,
     rounded: Rounded<C>,
-    /// `None` without depth intervals.
-    bounder: Option<ExactBounder>,
+    bounder: ExactBounder,
     work: TileLoop,
 }
 
@@ -185,10 +177,12 @@ impl<'a, C: Precision> Tests<'a, C> {
     fn new(rasterizer: &'a Rasterizer, triangle: &MovingTriangle, rect: &Rect, region: &'a Region) -> Self {
         let rounded = Rounded::<C>::new(&rasterizer.view, triangle, rect);
         let moving = rounded.triangle.moving;
-        let bounder = rasterizer.has_depths.then(|| ExactBounder::new(&rounded.triangle, &rounded.shear));
-        let depth_madds = bounder.as_ref().map_or(0, |_| set_up_madds(DepthBound::LocalPlanes, moving));
-        let place_madds = recentring_madds(moving, rasterizer.view.is_perspective());
-        let work = TileLoop { place_madds, depth_madds, ..TileLoop::default() };
+        let work = TileLoop {
+            place_madds: recentring_madds(moving, rasterizer.view.is_perspective()),
+            depth_madds: set_up_madds(DepthBound::LocalPlanes, moving),
+            ..TileLoop::default()
+        };
+        let bounder = ExactBounder::new(&rounded.triangle, &rounded.shear);
         Self { rasterizer, region, rounded, bounder, work }
     }
 
@@ -292,12 +286,9 @@ impl<'a, C: Precision> Tests<'a, C> {
 
     /// The intervals with the depths (thesis, Paper VI, Appendix A, both tests), or `None` if there are none.
     fn depths(&mut self, tile: &TileRect<C>, within: &Box5<C>) -> Option<Touch> {
-        let mut z = [self.rasterizer.view.near(), f64::INFINITY];
-        if let Some(bounder) = &self.bounder {
-            self.work.depth_madds += exact_interval_madds(self.rounded.triangle.moving, within.lens);
-            let [lo, hi] = self.rounded.depths(bounder.over(tile, within, self.rounded.depth_slack));
-            z = [lo.max(z[0]), hi];
-        }
+        self.work.depth_madds += exact_interval_madds(self.rounded.triangle.moving, within.lens);
+        let [lo, hi] = self.rounded.depths(self.bounder.over(tile, within, self.rounded.depth_slack));
+        let z = [lo.max(self.rasterizer.view.near()), hi];
         let Region { u, v, t } = self.region.within(within);
         [u, v, t, z].iter().all(|[lo, hi]| lo <= hi).then_some(Touch { u, v, t, z })
     }

@@ -258,7 +258,7 @@ pub enum PassError {
     },
     /// The surfaces of a frame are too large.
     #[error(
-        "pass `{pass}`: the surfaces of the frame take {} GiB, more than {} GiB; draw fewer pixels, samples or passes",
+        "pass `{pass}`: the memory of the frame takes {} GiB, more than {} GiB; draw fewer pixels, samples or passes",
         .bytes.div_ceil(1 << 30),
         AddressSpace::MAX_BYTES >> 30
     )]

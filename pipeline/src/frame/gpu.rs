@@ -413,7 +413,7 @@ impl<'e> Gpu<'e> {
         let stored = (&self.surfaces, &self.buffers);
         let prepared = Pass::new(pass, (number, has_heat), stored, &mut self.space);
         self.check_frame(pass.name)?;
-        self.passes.push(PassReport::new(pass));
+        self.start(PassReport::new(pass));
         let reads = self.reads_of(&prepared.addresses, pass);
         if let Some(waits) = self.waits(&reads, pass) {
             self.barrier(waits);

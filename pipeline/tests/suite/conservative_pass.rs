@@ -94,21 +94,6 @@ fn a_still_triangle_is_counted_by_hand() {
     assert_eq!(kinds[..2], [PacketKind::Draw, PacketKind::Vertices]);
 }
 
-/// A shader that reads no depths gets none, and set-up and tiles have no work for them.
-#[test]
-fn depth_intervals_are_counted_only_for_shaders_that_read_them() {
-    let corners = [[0.5, 0.5, 2.0], [3.5, 0.5, 2.0], [0.5, 1.5, 4.0]];
-    let with = primitive([corners; 2], 0);
-    let without = Primitive { rasterizer: with.rasterizer.without_depths(), ..with.clone() };
-    let ((found, _, mut counts), (other, _, less)) = (drawn(&[with], 8), drawn(&[without], 8));
-    let tiles = |found: &[([u32; 2], [f64; 2])]| found.iter().map(|(tile, _)| *tile).collect::<Vec<_>>();
-    assert_eq!(tiles(&found), tiles(&other));
-    assert!(other.iter().all(|(_, z)| *z == [f64::NEG_INFINITY, f64::INFINITY]));
-    assert!(counts[Event::DepthIntervalMadds] > 0 && less[Event::DepthIntervalMadds] == 0);
-    counts[Event::DepthIntervalMadds] = 0;
-    assert_eq!(counts, less);
-}
-
 #[test]
 fn a_moving_triangle_counts_the_differences_of_its_vertices_once() {
     let open = [[0.5, 0.5, 2.0], [3.5, 0.5, 2.0], [0.5, 1.5, 4.0]];

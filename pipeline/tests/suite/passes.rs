@@ -160,7 +160,7 @@ fn a_frame_that_is_too_large_names_its_pass() {
         gpu.allocate(memory::AddressSpace::MAX_BYTES);
         let camera = camera(false);
         let error = gpu.draw(&RasterPass::new(&camera, &draws, settings).named("shadow")).unwrap_err();
-        assert!(error.to_string().starts_with("pass `shadow`: the surfaces of the frame take "), "{error}");
+        assert!(error.to_string().starts_with("pass `shadow`: the memory of the frame takes "), "{error}");
     });
 }
 

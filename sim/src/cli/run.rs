@@ -113,7 +113,7 @@ pub struct RunArgs {
     pub exr: bool,
     /// Write heat maps of a counter, or of the energy of all counters (joules), as PNG, EXR and CSV in heat/;
     /// with @PASS those of the passes of that name alone; may be given several times
-    #[arg(long, value_name = "COUNTER|joules[@PASS]", value_parser = heat)]
+    #[arg(long, value_name = "(COUNTER|joules)[@PASS]", value_parser = heat)]
     pub heat: Vec<HeatRequest>,
     /// Worker threads.
     #[command(flatten)]

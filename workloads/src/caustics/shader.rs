@@ -240,7 +240,7 @@ struct Face {
 
 /// The triangles of every beam, and what they are.
 fn primitives(seen: &[Option<Seen>], method: BeamMethod, grid: &Grid) -> (Vec<Primitive>, Vec<Face>) {
-    let whole = Rasterizer::new(View::orthographic()).halving(MAX_HALVINGS).without_depths();
+    let whole = Rasterizer::new(View::orthographic()).halving(MAX_HALVINGS);
     let (mut primitives, mut faces, mut volume) = (Vec::new(), Vec::new(), BoundingVolume::new());
     let mut add = |beam: usize, ends: [[DVec3; 3]; 2], corners: Option<[DVec3; 3]>| {
         let [open, close] = ends.map(|end| end.map(|p| p.to_array()));

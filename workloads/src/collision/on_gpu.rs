@@ -118,10 +118,10 @@ impl<'a, 'e> PassesOnGpu<'a, 'e> {
         }
     }
 
-    /// Vertices of an object in memory.
+    /// Vertices of an object in memory. Objects that are scaled are copies; they are charged as the first.
     fn vertices_of(&self, object: &Object) -> Option<MemoryRange> {
-        let at = self.objects.iter().position(|known| std::ptr::eq(known, object))?;
-        self.vertices.get(at).copied()
+        let at = self.objects.iter().position(|known| std::ptr::eq(known, object));
+        self.vertices.get(at.unwrap_or(0)).copied()
     }
 
     /// Where the next answer is.
@@ -216,7 +216,7 @@ impl PassBackend for PassesOnGpu<'_, '_> {
         known: Option<&TzBuffer>,
         each: &mut dyn FnMut(&Fragment),
     ) -> bool {
-        // An object that is not in memory is undecided, as one with too many fragments.
+        // There is a part, so there are objects.
         let Some(vertices) = self.vertices_of(part.object) else { return false };
         let binned = pass.primitives(part, bins);
         let primitives: Vec<Primitive> = binned.iter().map(|binned| binned.primitive.clone()).collect();

@@ -235,7 +235,6 @@ fn primitives(cells: &[Cell], grid: &Grid) -> Vec<Primitive> {
     let of = |(body, cell): (u32, &Cell)| {
         let [t, u, v] = [2, 3, 4].map(|axis| [cell.low[axis], cell.high[axis]]);
         let rasterizer = Rasterizer::new(View::orthographic()).clipped(Region { u, v, t }).halving(0);
-        let rasterizer = rasterizer.without_depths();
         let ([left, bottom, ..], [right, top, ..]) = (cell.low, cell.high);
         let corner = |x: f64, y: f64| [x, y, 1.0];
         let halves = [

@@ -139,8 +139,8 @@ fn heat_outside_image(simulated: &Simulated) -> Vec<Warning> {
     }
     let warning = |worst: &HeatPicture| {
         let message = format!(
-            "the heat map of {} shows {:.1} % of it (frame {}): the rest has no place in the image, because its passes are of \
-             another size; choose another quantity",
+            "the heat map of {} shows {:.1} % of it (frame {}): the rest has no place in the image (vertices, groups, memory, \
+             or passes of another size); choose another quantity or pass",
             worst.of,
             1e2 * worst.placed,
             worst.frame
@@ -204,7 +204,8 @@ pub(crate) fn beyond_stated(stated: &StatedError, actual: &Verified) -> Option<W
         .into_iter()
         .filter(is_beyond)
         .map(|(of, actual, stated)| {
-            format!("{of} {:+.2} % with {:.1} % stated", actual * 100.0, stated * 100.0)
+            let factor = 1.0 + error_size(libm::log1p(actual));
+            format!("{of} {:+.2} %, a factor of {factor:.3} with {:.3} stated", actual * 100.0, 1.0 + stated)
         })
         .collect();
     let message = format!(
@@ -396,9 +397,12 @@ mod tests {
         assert_eq!(beyond_stated(&stated, &off(0.24, -0.019)), None);
         let cycles = beyond_stated(&stated, &off(-0.21, 0.0)).unwrap();
         assert_eq!(cycles.code, Code::StatedErrorExceeded);
-        assert!(cycles.message.contains("(cycles -21.00 % with 25.0 % stated)"), "{cycles}");
+        assert!(
+            cycles.message.contains("(cycles -21.00 %, a factor of 1.266 with 1.250 stated)"),
+            "{cycles}"
+        );
         let both = beyond_stated(&stated, &off(0.26, 0.03)).unwrap();
-        let says = "(cycles +26.00 % with 25.0 % stated, energy +3.00 % with 2.0 % stated)";
+        let says = "(cycles +26.00 %, a factor of 1.260 with 1.250 stated, energy +3.00 %, a factor of 1.030 with 1.020 stated)";
         assert!(both.message.contains(says), "{both}");
     }
 
