@@ -256,7 +256,7 @@ pub enum PassError {
         /// The pass.
         pass: String,
     },
-    /// The surfaces of a frame are too large.
+    /// The memory of a frame is too large.
     #[error(
         "pass `{pass}`: the memory of the frame takes {} GiB, more than {} GiB; draw fewer pixels, samples or passes",
         .bytes.div_ceil(1 << 30),

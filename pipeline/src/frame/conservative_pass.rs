@@ -191,7 +191,8 @@ impl Gpu<'_> {
 }
 
 impl ConservativePass {
-    /// Draws triangles with `shader`, as one draw of the pass. `store` is given every result, with the column and row of its tile.
+    /// Draws triangles with `shader`, as one draw of the pass. `store` is given every result, with the column and
+    /// row of its tile.
     pub fn draw<S: TileShader>(
         &mut self,
         gpu: &mut Gpu<'_>,
@@ -201,7 +202,7 @@ impl ConservativePass {
     ) {
         let (first, warp_lanes) = (gpu.triangles_of_pass() as u32, gpu.spec().warp_lanes);
         let numbers = numbered(draw.primitives, first);
-        gpu.next_draw();
+        gpu.begin_draw(gpu.draws_of_pass().len() as u32);
         vertices(gpu, draw, self.workers.worker().lanes.costs());
         for (chunk, from) in chunks(draw.primitives) {
             if gpu.is_stopped() {

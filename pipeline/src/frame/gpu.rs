@@ -30,8 +30,6 @@ pub struct Gpu<'e> {
     space: AddressSpace,
     emit: Emit<'e>,
     passes: Vec<PassReport>,
-    /// Last batch of the last pass.
-    last_batch: u32,
     /// Results of passes, which are in memory when the frame ends.
     results: Vec<MemoryRange>,
     /// Results since the last barrier: other units cannot read them yet.
@@ -46,7 +44,7 @@ pub struct Gpu<'e> {
     is_on_map: bool,
     /// Where other tiles of the pass that was begun are on the heat maps, if anywhere.
     placement: Option<Placement>,
-    /// The draw that was begun in the pass that was begun.
+    /// The draw that was begun, if any.
     draw: Option<u32>,
     /// Whether packets are made wherever a pass can be drawn without them, too.
     is_counted: bool,
@@ -173,7 +171,6 @@ impl<'e> Gpu<'e> {
             space: AddressSpace::default(),
             emit,
             passes,
-            last_batch: 0,
             results,
             pending,
             surfaces: Surfaces::default(),
@@ -285,19 +282,17 @@ impl<'e> Gpu<'e> {
     pub(super) fn start(&mut self, report: PassReport) {
         self.heat.begin(Some(&report.name));
         self.passes.push(report);
-        self.last_batch = 0;
         self.is_on_map = false;
         self.placement = None;
         self.draw = None;
     }
 
-    /// Begins the next draw of a pass that was begun. Returns its number.
-    pub(super) fn next_draw(&mut self) -> u32 {
-        let Some(pass) = self.passes.last_mut() else { return 0 };
-        pass.draws.push(Counts::default());
-        let number = pass.draws.len() as u32 - 1;
+    /// What follows in the pass that was begun is of draw `number`.
+    pub(super) fn begin_draw(&mut self, number: u32) {
+        if let Some(pass) = self.passes.last_mut() {
+            pass.draws.resize(pass.draws.len().max(number as usize + 1), Counts::default());
+        }
         self.draw = Some(number);
-        number
     }
 
     /// What follows in the pass is of no single draw.
@@ -382,7 +377,6 @@ impl<'e> Gpu<'e> {
             report.triangles += triangles;
             report.add(packet);
         }
-        self.last_batch = self.last_batch.max(packet.batch);
         (self.emit)(packet, self.memory.log());
         self.memory.clear_log();
     }
@@ -402,7 +396,7 @@ impl<'e> Gpu<'e> {
     ///
     /// # Errors
     /// [`PassError`] if a cache of the settings is invalid, if a surface or buffer cannot be used as it is,
-    /// or if the surfaces of the frame are too large.
+    /// or if the memory of the frame is too large.
     pub fn draw(&mut self, pass: &RasterPass<'_>) -> Result<Rendered, PassError> {
         let number = self.passes.len() as u32;
         let has_heat = self.has_heat_of(pass.settings.viewport);
@@ -426,7 +420,6 @@ impl<'e> Gpu<'e> {
             }
             None => self.pass(&prepared, pass)?,
         };
-        self.last_batch = prepared.batches().len().max(1) as u32 - 1;
         if self.write_answers(pass.draws) {
             drawn.counts = self.counts_of_pass();
         }

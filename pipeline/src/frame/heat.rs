@@ -26,8 +26,6 @@ pub struct HeatMap {
     pub samples: Vec<u32>,
     /// Events of samples in each fine tile whose pixels are not known.
     spread: Vec<u64>,
-    /// Whether the events of now are those of its passes.
-    is_counting: bool,
     width: u32,
     height: u32,
 }
@@ -112,7 +110,6 @@ impl HeatMap {
             elsewhere: 0,
             samples: if is_of_samples { vec![0; viewport.pixels()] } else { Vec::new() },
             spread: vec![0; tiles(spec.tile_px).len()],
-            is_counting: pass.is_none(),
             width,
             height,
         }
@@ -230,7 +227,8 @@ impl HeatMap {
 #[derive(Default)]
 pub(super) struct FrameHeat {
     viewport: Option<Viewport>,
-    maps: Vec<HeatMap>,
+    /// Each with whether it counts what is added now.
+    maps: Vec<(HeatMap, bool)>,
 }
 
 impl FrameHeat {
@@ -242,19 +240,20 @@ impl FrameHeat {
         spec: &PipelineSpec,
         viewport: Viewport,
     ) -> Self {
-        self.maps.extend(events.iter().map(|&event| HeatMap::new(event, pass, spec, viewport)));
+        let map = |&event: &Event| (HeatMap::new(event, pass, spec, viewport), pass.is_none());
+        self.maps.extend(events.iter().map(map));
         Self { viewport: Some(viewport).filter(|_| !self.maps.is_empty()), ..self }
     }
 
     /// What is added from now on is of a pass of this name, or of none.
     pub fn begin(&mut self, pass: Option<&str>) {
-        for map in &mut self.maps {
-            map.is_counting = map.pass.is_none() || map.pass.as_deref() == pass;
+        for (map, counts) in &mut self.maps {
+            *counts = map.pass.is_none() || map.pass.as_deref() == pass;
         }
     }
 
     fn counting(&mut self) -> impl Iterator<Item = &mut HeatMap> {
-        self.maps.iter_mut().filter(|map| map.is_counting)
+        self.maps.iter_mut().filter(|(_, counts)| *counts).map(|(map, _)| map)
     }
 
     /// Whether there are maps over images of this size.
@@ -272,7 +271,7 @@ impl FrameHeat {
     /// Add a packet of a drawn pass whose images are parts of that of the maps, each with the pixels of the tile.
     /// Tile tests in a packet of another tile are counted at that tile.
     pub fn drawn_at<I: Iterator<Item = [[u32; 2]; 2]>>(&mut self, packet: &Packet, pixels: impl Fn() -> I) {
-        let Some(map) = self.maps.first().filter(|_| is_placed(packet)) else {
+        let Some((map, _)) = self.maps.first().filter(|_| is_placed(packet)) else {
             return self.drawn(packet, false);
         };
         let is_inside = |range: &[[u32; 2]; 2]| range[0][1] <= map.width && range[1][1] <= map.height;
@@ -299,7 +298,7 @@ impl FrameHeat {
 
     /// Add a packet of a pass in conservative mode, whose events are spread over the pixels of a block of its tiles.
     pub fn add_block(&mut self, packet: &Packet, placement: &Placement, block: &Block) {
-        let Some(map) = self.maps.first() else { return };
+        let Some((map, _)) = self.maps.first() else { return };
         let range = placement.pixels(block, [map.width, map.height]);
         let parts = map.parts(range);
         let pixels = parts.iter().map(|(_, share)| share).sum();
@@ -308,7 +307,7 @@ impl FrameHeat {
 
     /// The maps.
     pub fn into_maps(self) -> Vec<HeatMap> {
-        self.maps
+        self.maps.into_iter().map(|(map, _)| map).collect()
     }
 }
 

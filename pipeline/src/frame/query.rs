@@ -256,8 +256,8 @@ impl Gpu<'_> {
         }
     }
 
-    /// Queries boxes in a pass of its own, each as a draw. A query ends at its first tile that may see the box. The unit
-    /// of depth writes the answers to memory, a word each.
+    /// Queries boxes in a pass of its own, each as a draw. A query ends at its first tile that may see the box. The
+    /// unit of depth writes the answers to memory, a word each.
     pub fn query_boxes(
         &mut self,
         name: &str,
@@ -268,7 +268,6 @@ impl Gpu<'_> {
         let written = self.allocate(objects.len() as u64 * ANSWER_BYTES);
         self.open(name, None);
         let answers: Vec<_> = objects.iter().map(|object| queries.query(object)).collect();
-        objects.iter().for_each(|_| _ = self.next_draw());
         let size = self.spec().batch_triangles;
         let queried: Vec<_> = (0..).zip(&answers).collect();
         let batch = |number: u32| FACES.len() as u32 * number / size;
@@ -315,8 +314,8 @@ impl Gpu<'_> {
 
     /// Emits the tiles of a box that the query came to, and its answer.
     fn box_tiles(&mut self, number: u32, answer: &IntervalAnswer, answers: MemoryRange) {
-        let triangle = Some(FACES.len() as u32 * number);
-        let mut packet = Packet { draw: number, ..self.packet(PacketKind::Tile, Packet::NONE, triangle) };
+        self.begin_draw(number);
+        let mut packet = self.packet(PacketKind::Tile, Packet::NONE, Some(FACES.len() as u32 * number));
         let counts = &mut packet.counts;
         let [_, tile_madds, depth_madds] = answer.madds.map(|madds| madds as u32);
         counts[Event::TilesVisited] = answer.tiles as u32;
@@ -336,11 +335,11 @@ impl Gpu<'_> {
         answer: &IntervalAnswer,
         corners: MemoryRange,
     ) {
-        let mut start = Packet { draw: number, ..self.packet(PacketKind::Draw, Packet::NONE, None) };
+        self.begin_draw(number);
+        let mut start = self.packet(PacketKind::Draw, Packet::NONE, None);
         start.counts[Event::Draws] = 1;
         self.push(&start, 0);
-        let triangle = Some(FACES.len() as u32 * number);
-        let mut packet = Packet { draw: number, ..self.packet(PacketKind::Vertices, Packet::NONE, triangle) };
+        let mut packet = self.packet(PacketKind::Vertices, Packet::NONE, Some(FACES.len() as u32 * number));
         let counts = &mut packet.counts;
         counts[Event::Indices] = 3 * FACES.len() as u32;
         counts[Event::VerticesFetched] = CORNERS;

@@ -61,7 +61,7 @@ impl Gpu<'_> {
     /// # Errors
     /// [`PassError::Surface`] if nothing is stored in the samples, if the surfaces differ in size or are one,
     /// if the second has several samples, or if values of a format have no mean; [`PassError::Memory`] if the
-    /// surfaces of the frame are too large.
+    /// memory of the frame is too large.
     pub fn resolve(&mut self, pass: &ResolvePass<'_>, to: SurfaceId) -> Result<Counts, PassError> {
         let (texels, from) = self.samples_of(pass)?;
         let refused = |problem| Err(self.surfaces.refused(pass.name, to, problem));

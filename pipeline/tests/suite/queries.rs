@@ -217,7 +217,13 @@ fn answers_reach_memory() {
     let projection = Projection::new(&stage.camera, stage.viewport);
     let mut gpu = Gpu::without_packets(&spec).unwrap();
     gpu.query_boxes("queries", &IntervalQueries::new(&pyramid, &projection), &boxes);
-    assert_eq!(written(&gpu.finish()), [21, 128]);
+    let report = gpu.finish();
+    assert_eq!(written(&report), [21, 128]);
+    let [pass] = &report.passes[..] else { unreachable!() };
+    assert_eq!((pass.draws.len(), pass.others), (21, Counts::default()));
+    for draw in &pass.draws {
+        assert_eq!([Event::DepthWrites, Event::Draws, Event::VerticesFetched].map(|of| draw[of]), [1, 1, 8]);
+    }
 
     for query in [Query::Any, Query::Count] {
         let mut gpu = Gpu::without_packets(&spec).unwrap();

@@ -199,7 +199,7 @@ fn sixty_four_passes_and_a_target_larger_than_memory() {
             gpu.resolve_image(&ResolvePass::new("resolve", from), Vec3::ZERO).unwrap_err(),
         ] {
             assert!(
-                message.to_string().starts_with("pass `resolve`: the surfaces of the frame take "),
+                message.to_string().starts_with("pass `resolve`: the memory of the frame takes "),
                 "{message}"
             );
         }

@@ -778,7 +778,7 @@ fn what_surfaces_cannot_do_is_refused_by_name() {
         },
         flat(),
     );
-    assert!(memory.starts_with("pass `light`: the surfaces of the frame take "), "{memory}");
+    assert!(memory.starts_with("pass `light`: the memory of the frame takes "), "{memory}");
 }
 
 /// The error names the surface, the first draw that reads it, also as a buffer, and the first that writes it.

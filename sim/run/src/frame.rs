@@ -147,7 +147,7 @@ pub(crate) fn draw<'a>(
     let (ready, requests) = (plan.job.prepare(number)?, &plan.options.heat);
     let (drawn, mut report) = draw_on(&plan.gpu, Some((requests, plan.viewport)), &*ready, stop, emit)?;
     if stop.is_none_or(|stop| !stop.get()) {
-        heat::check_passes(requests, &report, number)?;
+        heat::check_passes(requests, &report)?;
     }
     let Drawn { image, moving, lens, facts, warnings } = drawn;
     let heat = std::mem::take(&mut report.heat);

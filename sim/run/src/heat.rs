@@ -16,7 +16,7 @@ use output::table::{grouped, si};
 /// Heat map of the report.
 pub struct HeatPicture {
     /// What the map shows.
-    pub of: HeatRequest,
+    pub request: HeatRequest,
     /// Number of the frame.
     pub frame: u32,
     /// Share of the quantity that has a place in the image; 0 where there is none at all.
@@ -32,7 +32,7 @@ pub(super) fn with_maps<'g>(mut gpu: Gpu<'g>, requests: &[HeatRequest], viewport
     passes.dedup();
     for pass in passes {
         let events =
-            events(requests.iter().filter(|of| of.pass.as_deref() == pass).map(|request| request.of));
+            events(requests.iter().filter(|of| of.pass.as_deref() == pass).map(|request| request.quantity));
         gpu = match pass {
             Some(pass) => gpu.with_heat_of_pass(pass, &events, viewport),
             None => gpu.with_heat(&events, viewport),
@@ -56,17 +56,14 @@ fn events(quantities: impl Iterator<Item = HeatQuantity>) -> Vec<Event> {
 ///
 /// # Errors
 /// [`RunError::Setting`] with the names of its passes.
-pub(super) fn check_passes(
-    requests: &[HeatRequest],
-    report: &FrameReport,
-    frame: u32,
-) -> Result<(), RunError> {
+pub(super) fn check_passes(requests: &[HeatRequest], report: &FrameReport) -> Result<(), RunError> {
     let mut names: Vec<&str> = report.passes.iter().map(|pass| &*pass.name).collect();
     let missing = requests.iter().find(|of| of.pass.as_deref().is_some_and(|pass| !names.contains(&pass)));
     let Some(missing) = missing else { return Ok(()) };
     names.sort_unstable();
     names.dedup();
-    let why = format!("`{missing}`: frame {frame} has no such pass; it has {}", names.join(", "));
+    // No number of a frame: which of several is drawn first depends on the threads.
+    let why = format!("`{missing}`: a frame has no such pass; it has {}", names.join(", "));
     Err(RunError::invalid("heat", why))
 }
 
@@ -82,7 +79,7 @@ pub(super) fn write_all(
     let brightness = if plan.options.heat.is_empty() { Vec::new() } else { brightness(image) };
     let write = |request: &HeatRequest| {
         let maps = maps.iter().filter(|map| map.pass == request.pass);
-        let weighted: Vec<_> = match request.of {
+        let weighted: Vec<_> = match request.quantity {
             HeatQuantity::Event(event) => {
                 maps.filter(|map| map.event == event).map(|map| (map, 1.0)).collect()
             }
@@ -169,19 +166,19 @@ impl Heat {
         dir.write_file(&format!("{name}.csv"), |out| self.table(out))?;
         // A quantity that is 0 has no part outside the image.
         let placed = if self.total > 0.0 { 1.0 - self.elsewhere / self.total } else { 1.0 };
-        Ok(HeatPicture { of: self.request.clone(), frame, placed, png })
+        Ok(HeatPicture { request: self.request.clone(), frame, placed, png })
     }
 
     /// What is shown, for titles.
     fn subject(&self) -> String {
-        let name = self.request.of.name();
+        let name = self.request.quantity.name();
         self.request.pass.as_ref().map_or_else(|| name.to_owned(), |pass| format!("{name} of pass {pass}"))
     }
 
     fn picture(&self, plan: &Plan, frame: u32, brightness: &[f32]) -> Picture {
         let side = if self.is_by_pixel { block_px(self.pixels.len()) } else { plan.gpu.pipeline.tile_px };
         let spread = if side == 1 { String::new() } else { format!(", the mean over {side}x{side} pixels") };
-        let shown = |value: f64| match self.request.of {
+        let shown = |value: f64| match self.request.quantity {
             HeatQuantity::Event(_) => grouped(value as u64),
             HeatQuantity::Joules => si(value, "J"),
         };
@@ -192,7 +189,7 @@ impl Heat {
         let plot = HeatMapPlot {
             title: &format!("{} per pixel, frame {frame}{spread}", self.subject()),
             subject: &format!("{} on {}: {} in all{elsewhere}", plan.name, plan.gpu.name, shown(self.total)),
-            label: match self.request.of {
+            label: match self.request.quantity {
                 HeatQuantity::Event(_) => "events per pixel",
                 HeatQuantity::Joules => "joules per pixel",
             },
@@ -239,11 +236,11 @@ impl Heat {
     /// Writes the value of each fine tile, then of each coarse tile that has events of its own.
     fn table(&self, out: &mut dyn std::io::Write) -> Result<(), BoxError> {
         let mut table = csv::Writer::from_writer(out);
-        let column = if self.request.of == HeatQuantity::Joules { "energy_J" } else { "count" };
+        let column = if self.request.quantity == HeatQuantity::Joules { "energy_J" } else { "count" };
         table.write_record(["x_px", "y_px", "width_px", "height_px", column])?;
         let coarse = self.coarse.iter().filter(|tile| tile.value > 0.0);
         for ValueTile { origin: [x, y], size: [width, height], value } in self.tiles.iter().chain(coarse) {
-            match self.request.of {
+            match self.request.quantity {
                 HeatQuantity::Event(_) => table.serialize((x, y, width, height, *value as u64))?,
                 HeatQuantity::Joules => table.serialize((x, y, width, height, value))?,
             }

@@ -100,7 +100,7 @@ impl HeatQuantity {
 #[serde(into = "String", try_from = "String")]
 pub struct HeatRequest {
     /// Quantity.
-    pub of: HeatQuantity,
+    pub quantity: HeatQuantity,
     /// Name of the passes; `None` for the whole frame.
     pub pass: Option<String>,
 }
@@ -113,7 +113,7 @@ impl HeatRequest {
 
     /// Path of the files of frame `frame` in a results folder, without extension.
     pub(crate) fn path(&self, frame: u32) -> String {
-        let name = self.of.name();
+        let name = self.quantity.name();
         match &self.pass {
             Some(pass) => {
                 let pass = pass.replace(|symbol: char| !symbol.is_alphanumeric(), "-");
@@ -126,7 +126,7 @@ impl HeatRequest {
 
 impl fmt::Display for HeatRequest {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let name = self.of.name();
+        let name = self.quantity.name();
         match &self.pass {
             Some(pass) => write!(f, "{name}@{pass}"),
             None => f.write_str(name),
@@ -145,9 +145,9 @@ impl TryFrom<String> for HeatRequest {
 
     fn try_from(text: String) -> Result<Self, String> {
         let (name, pass) = Self::split(&text);
-        let of = HeatQuantity::all().find(|quantity| quantity.name() == name);
-        let of = of.ok_or_else(|| format!("no heat map of `{name}`"))?;
-        Ok(Self { of, pass: pass.map(str::to_owned) })
+        let quantity = HeatQuantity::all().find(|quantity| quantity.name() == name);
+        let quantity = quantity.ok_or_else(|| format!("no heat map of `{name}`"))?;
+        Ok(Self { quantity, pass: pass.map(str::to_owned) })
     }
 }
 

@@ -88,11 +88,11 @@ pub(super) fn images(plan: &Plan, pictures: &[(u32, Vec<Vec3>)]) -> Result<Vec<R
 fn heat(outcome: &FinishedRun) -> impl Iterator<Item = ReportImage> {
     outcome.simulated.heat.iter().map(|map| ReportImage {
         caption: {
-            let place = match &map.of.pass {
+            let place = match &map.request.pass {
                 Some(pass) => format!("pass {pass} of frame {}", map.frame),
                 None => format!("frame {}", map.frame),
             };
-            match map.of.of {
+            match map.request.quantity {
                 HeatQuantity::Event(event) => {
                     format!("where in {place} the counter {} counted", event.name())
                 }
@@ -100,7 +100,7 @@ fn heat(outcome: &FinishedRun) -> impl Iterator<Item = ReportImage> {
             }
         },
         png: map.png.clone(),
-        link: Some(format!("{}.png", map.of.path(map.frame))),
+        link: Some(format!("{}.png", map.request.path(map.frame))),
     })
 }
 

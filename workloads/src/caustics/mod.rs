@@ -166,12 +166,14 @@ impl Draws for Caustics {
         let method = self.options.method;
         let (beams, stored) = refract_on(gpu, &self.ocean, *time_s, method)?;
         let (picture, buffer) = draw_stored(gpu, (&beams, stored), &eye, method, self.light())?;
+        let mut warnings = accuracy_warnings(&self.ocean, &beams);
+        warnings.extend(from_host(gpu.spec()));
         Ok(Drawn {
             image: tone_on(gpu, &eye, &picture.light, buffer, white(&picture.light)),
             moving: method == BeamMethod::Moving,
             lens: false,
             facts: facts(&picture, &beams),
-            warnings: [accuracy_warnings(&self.ocean, &beams), from_host(gpu.spec())].concat(),
+            warnings,
         })
     }
 }
@@ -332,10 +334,10 @@ pub fn crossing(beams: &[Beam]) -> f64 {
 }
 
 /// Warning that time and energy lack the passes that make the beams.
-fn from_host(spec: &PipelineSpec) -> Vec<Warning> {
+fn from_host(spec: &PipelineSpec) -> Option<Warning> {
     let message = "the GPU has no compute unit, so the host makes the beams and no time or energy of the frame is that of refraction; \
                    give the GPU a `compute` unit to compare it with others";
-    spec.compute.is_none().then(|| Warning::new(Code::CausticsFromHost, message)).into_iter().collect()
+    spec.compute.is_none().then(|| Warning::new(Code::CausticsFromHost, message))
 }
 
 /// Warnings about an ocean made of these beams.

@@ -262,8 +262,8 @@ mod tests {
     /// Every object has vertices of its own, and each of its draws its own counts.
     #[test]
     fn every_object_is_read_from_memory() {
-        let read = |balls: &str| {
-            let job = made(&[("resolution", "4"), ("balls", balls)]).unwrap();
+        let read = |method: &str, balls: &str| {
+            let job = made(&[("resolution", "4"), ("balls", balls), ("method", method)]).unwrap();
             let hardware = hardware();
             let mut gpu = Gpu::new(&hardware, |_: &Packet, _| ()).unwrap();
             job.frame(0, &mut gpu).unwrap();
@@ -274,12 +274,15 @@ mod tests {
             }
             let first = &report.passes[0];
             assert!(first.draws.iter().all(|draw| draw[Event::VerticesFetched] > 0));
-            (first.draws.len() as u64, first.counts()[Event::DramReadBytes])
+            let of_object = first.draws[0][Event::VertexBytes];
+            (first.draws.len() as u64, first.counts()[Event::DramReadBytes] / of_object)
         };
-        let [(few, few_bytes), (many, many_bytes)] = ["4", "8"].map(read);
-        // An object is compared, then added.
-        assert_eq!((few, many), (2 * 4, 2 * 8));
-        assert!(few_bytes > 0 && many_bytes >= 2 * few_bytes, "{few_bytes} and {many_bytes}");
+        // An object is compared, then added; or drawn once, and boxes are compared.
+        for (method, draws) in [("fragment_box", 2), ("box_box", 1)] {
+            for (balls, objects) in [("4", 4), ("8", 8)] {
+                assert_eq!(read(method, balls), (objects * draws, objects), "{method}");
+            }
+        }
     }
 
     #[test]

@@ -131,7 +131,7 @@ const MIN_PLACED: f64 = 0.1;
 fn heat_outside_image(simulated: &Simulated) -> Vec<Warning> {
     let mut worst: Vec<&HeatPicture> = Vec::new();
     for picture in &simulated.heat {
-        match worst.iter_mut().find(|worst| worst.of == picture.of) {
+        match worst.iter_mut().find(|worst| worst.request == picture.request) {
             Some(worst) if picture.placed < worst.placed => *worst = picture,
             Some(_) => {}
             None => worst.push(picture),
@@ -141,7 +141,7 @@ fn heat_outside_image(simulated: &Simulated) -> Vec<Warning> {
         let message = format!(
             "the heat map of {} shows {:.1} % of it (frame {}): the rest has no place in the image (vertices, groups, memory, \
              or passes of another size); choose another quantity or pass",
-            worst.of,
+            worst.request,
             1e2 * worst.placed,
             worst.frame
         );
@@ -451,9 +451,9 @@ mod tests {
     fn each_heat_map_that_shows_next_to_nothing_has_one_warning() {
         let [hits, madds, reads] =
             [Event::SamplesHit, Event::TileMadds, Event::DepthReads].map(HeatQuantity::Event);
-        let picture = |(of, frame, placed)| {
-            let of = HeatRequest { of, pass: None };
-            HeatPicture { of, frame, placed, png: Vec::new() }
+        let picture = |(quantity, frame, placed)| {
+            let request = HeatRequest { quantity, pass: None };
+            HeatPicture { request, frame, placed, png: Vec::new() }
         };
         let heat = [(hits, 3, 0.05), (madds, 3, 0.0), (reads, 3, 0.9), (hits, 4, 0.01), (madds, 4, 0.5)];
         let heat = heat.map(picture).into();
