@@ -79,6 +79,7 @@ pub use frame::{
     IntervalAnswer, IntervalQueries, Lanes, Load, MovingBox, PassError, PassPart, PassReport, PipelineSpec,
     Placement, Primitive, Query, RasterPass, Rendered, ResolvePass, SampledAnswer, SampledAnswers,
     SampledQueries, Settings, Shading, Store, SurfaceId, SurfaceProblem, Target, TileIntervals, TileShader,
+    Uses,
 };
 pub use geometry::{
     Camera, CameraError, Clip, Cull, DrawError, Geometry, Lens, MovingVertex, Shear, Viewport,

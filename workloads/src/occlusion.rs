@@ -202,10 +202,10 @@ impl Occlusion {
         let viewport = occluders.settings.viewport;
         let drawn = gpu.draw(occluders)?;
         let pyramid = self.pyramid(&depths_of(&drawn.visible), viewport)?;
-        gpu.gather_farthest_depths("farthest depths", &pyramid, drawn.region);
+        gpu.gather_farthest_depths("farthest depths", &pyramid, drawn.region)?;
         let projection = Projection::new(&self.wall_scene.camera, viewport);
         let queries = IntervalQueries::new(&pyramid, &projection);
-        let answers = gpu.query_boxes("queries", &queries, &self.wall_scene.boxes);
+        let answers = gpu.query_boxes("queries", &queries, &self.wall_scene.boxes)?;
         Ok(Answers::of_intervals(&answers, pyramid.half_covered()))
     }
 

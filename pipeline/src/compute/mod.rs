@@ -27,6 +27,7 @@ use glam::Vec4;
 use serde::{Deserialize, Serialize};
 
 use crate::buffer::{Access, Atomic, Buffer, BufferBinding, Buffers, Stored, Word};
+use crate::memory::MemoryRange;
 use crate::shader::Lane;
 use crate::surface::{Format, Layout, SurfaceSpec};
 pub(crate) use warp::Touched;
@@ -186,6 +187,11 @@ impl SurfaceView {
     /// The surface, for a pass that reads it.
     pub fn reads(&self) -> BufferBinding {
         self.words.reads()
+    }
+
+    /// Where the surface lies in memory.
+    pub fn region(&self) -> MemoryRange {
+        self.words.region()
     }
 
     /// Width and height in pixels.

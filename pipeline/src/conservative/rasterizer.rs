@@ -74,19 +74,27 @@ pub struct Rasterizer {
     clip: Region,
     halvings: u32,
     in_doubles: bool,
+    finds_depths: bool,
 }
 
 impl Rasterizer {
     /// A rasterizer for the whole lens and shutter in `view`, with tests in `f32`; the time of a touched tile
     /// is halved twice.
     pub fn new(view: View) -> Self {
-        Self { view, clip: Region::WHOLE, halvings: 2, in_doubles: false }
+        Self { view, clip: Region::WHOLE, halvings: 2, in_doubles: false, finds_depths: true }
     }
 
     /// The rasterizer with tests in `f64`, for tiles smaller than the precision of `f32`.
     #[must_use]
     pub fn in_doubles(self) -> Self {
         Self { in_doubles: true, ..self }
+    }
+
+    /// The rasterizer for shaders that read no depths: those of a tile reach from the near depth to infinity, and cull
+    /// none.
+    #[must_use]
+    pub fn without_depths(self) -> Self {
+        Self { finds_depths: false, ..self }
     }
 
     /// The rasterizer limited to a part of lens and shutter, ends included (user clip planes).
@@ -179,7 +187,11 @@ impl<'a, C: Precision> Tests<'a, C> {
         let moving = rounded.triangle.moving;
         let work = TileLoop {
             place_madds: recentring_madds(moving, rasterizer.view.is_perspective()),
-            depth_madds: set_up_madds(DepthBound::LocalPlanes, moving),
+            depth_madds: if rasterizer.finds_depths {
+                set_up_madds(DepthBound::LocalPlanes, moving)
+            } else {
+                0
+            },
             ..TileLoop::default()
         };
         let bounder = ExactBounder::new(&rounded.triangle, &rounded.shear);
@@ -286,9 +298,13 @@ impl<'a, C: Precision> Tests<'a, C> {
 
     /// The intervals with the depths (thesis, Paper VI, Appendix A, both tests), or `None` if there are none.
     fn depths(&mut self, tile: &TileRect<C>, within: &Box5<C>) -> Option<Touch> {
-        self.work.depth_madds += exact_interval_madds(self.rounded.triangle.moving, within.lens);
-        let [lo, hi] = self.rounded.depths(self.bounder.over(tile, within, self.rounded.depth_slack));
-        let z = [lo.max(self.rasterizer.view.near()), hi];
+        let near = self.rasterizer.view.near();
+        let mut z = [near, f64::INFINITY];
+        if self.rasterizer.finds_depths {
+            self.work.depth_madds += exact_interval_madds(self.rounded.triangle.moving, within.lens);
+            let [lo, hi] = self.rounded.depths(self.bounder.over(tile, within, self.rounded.depth_slack));
+            z = [lo.max(near), hi];
+        }
         let Region { u, v, t } = self.region.within(within);
         [u, v, t, z].iter().all(|[lo, hi]| lo <= hi).then_some(Touch { u, v, t, z })
     }

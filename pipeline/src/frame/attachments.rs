@@ -250,6 +250,29 @@ pub enum PassError {
         /// Name of the surface.
         surface: String,
     },
+    /// The shaders of a pass read memory that they write.
+    #[error(
+        "pass `{pass}`: its texture unit reads the {bytes} bytes from address {address}, which it also writes; write to other memory, or \
+         access it as a target alone"
+    )]
+    Feedback {
+        /// The pass.
+        pass: String,
+        /// Bytes of the range that is read.
+        bytes: u64,
+        /// Where it begins.
+        address: u64,
+    },
+    /// A shader accesses memory that its pass does not state.
+    #[error(
+        "pass `{pass}`: a shader accesses the line at address {line} in a way that the pass does not state; add its range to the `Uses`"
+    )]
+    Unstated {
+        /// The pass.
+        pass: String,
+        /// Address of the line.
+        line: u64,
+    },
     /// The frame was stopped.
     #[error("pass `{pass}` is not drawn: the frame was stopped before it")]
     Stopped {

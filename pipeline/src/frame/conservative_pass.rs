@@ -10,8 +10,10 @@ use activity::{Event, Packet, PacketCounts, PacketKind};
 use rayon::prelude::*;
 
 use super::Gpu;
+use super::attachments::PassError;
 use super::heat::{Block, Placement};
 use super::lanes::{LaneWork, Lanes};
+use super::uses::Uses;
 use crate::conservative::{Grid, MovingTriangle, Rasterizer, TileLoop, Touch};
 use crate::depth::{Numbers, Real};
 use crate::geometry::Projection;
@@ -182,31 +184,45 @@ impl<T> BodyLog<T> {
 }
 
 impl Gpu<'_> {
-    /// Begins a pass in conservative mode. Heat maps show its work on tiles where they are in the image of
-    /// the frame, if they are there at all.
-    pub fn begin_conservative(&mut self, name: &str, placement: Option<Placement>) -> ConservativePass {
+    /// Begins a pass in conservative mode, whose shaders access what `uses` states. Heat maps show its work on tiles
+    /// where they are in the image of the frame, if they are there at all.
+    ///
+    /// # Errors
+    /// [`PassError::Feedback`] if memory is read and written, [`PassError::Stopped`] and [`PassError::Memory`].
+    pub fn begin_conservative(
+        &mut self,
+        name: &str,
+        placement: Option<Placement>,
+        uses: Uses,
+    ) -> Result<ConservativePass, PassError> {
+        self.check_uses(name, &uses)?;
         self.open_placed(name, placement);
-        ConservativePass::default()
+        self.use_memory(uses);
+        Ok(ConservativePass::default())
     }
 }
 
 impl ConservativePass {
     /// Draws triangles with `shader`, as one draw of the pass. `store` is given every result, with the column and
-    /// row of its tile.
+    /// row of its tile. Once the frame is stopped, there are no more.
+    ///
+    /// # Errors
+    /// [`PassError::Unstated`] if a shader accesses memory that the pass does not state.
     pub fn draw<S: TileShader>(
         &mut self,
         gpu: &mut Gpu<'_>,
         draw: &ConservativeDraw<'_>,
         shader: &S,
         mut store: impl FnMut([u32; 2], S::Output),
-    ) {
+    ) -> Result<(), PassError> {
         let (first, warp_lanes) = (gpu.triangles_of_pass() as u32, gpu.spec().warp_lanes);
         let numbers = numbered(draw.primitives, first);
         gpu.begin_draw(gpu.draws_of_pass().len() as u32);
+        gpu.read_vertices(draw.vertices);
         vertices(gpu, draw, self.workers.worker().lanes.costs());
         for (chunk, from) in chunks(draw.primitives) {
             if gpu.is_stopped() {
-                return;
+                return Ok(());
             }
             let bodies: Vec<&[Primitive]> = chunk.chunk_by(|a, b| a.body == b.body).collect();
             let starts = bodies.iter().scan(from, |next, body| {
@@ -222,9 +238,10 @@ impl ConservativePass {
             let logs: Vec<BodyLog<S::Output>> =
                 bodies.par_iter().zip(&starts).map_init(workers, log).collect();
             for log in logs {
-                self.body(gpu, (draw, &numbers), log, &mut store);
+                self.body(gpu, (draw, &numbers), log, &mut store)?;
             }
         }
+        Ok(())
     }
 
     /// Emits the packets of a body, one for each triangle and block of tiles.
@@ -234,7 +251,7 @@ impl ConservativePass {
         (draw, numbers): (&ConservativeDraw<'_>, &[u32]),
         log: BodyLog<T>,
         store: &mut impl FnMut([u32; 2], T),
-    ) {
+    ) -> Result<(), PassError> {
         let mut rest = log.rest.into_iter().peekable();
         for PacketLog { primitive, block, tests, lanes } in log.packets {
             while let Some((primitive, tests)) = rest.next_if(|(before, _)| *before < primitive) {
@@ -243,7 +260,7 @@ impl ConservativePass {
             let mut packet = gpu.packet(PacketKind::Tile, block, Some(numbers[primitive]));
             add(&tests, &mut packet.counts);
             let written = &mut self.written;
-            lanes.add_to(&mut packet.counts, gpu.memory(), |line| written.insert(line));
+            gpu.access(&lanes, &mut packet.counts, |line| written.insert(line))?;
             gpu.push_block(&packet, &draw.tiles_of(block));
         }
         for (tile, output) in log.outputs {
@@ -252,6 +269,7 @@ impl ConservativePass {
         for (primitive, tests) in rest {
             emit_tests(gpu, numbers[primitive], &draw.scissor_of(primitive), &tests);
         }
+        Ok(())
     }
 }
 

@@ -9,6 +9,7 @@ use super::attachments::{PassError, SurfaceId};
 use super::gpu::{Gpu, PassReport, Rendered};
 use super::heat::Block;
 use super::lanes::{LaneWork, Lanes, Run};
+use super::uses::Uses;
 use crate::buffer::{Access, Buffer, BufferBinding, Stored, Word};
 use crate::compute::{self, ComputeError, ComputePass, ComputeSpec, GroupLog, SurfaceView, Touched};
 use crate::geometry::Viewport;
@@ -140,44 +141,56 @@ impl Gpu<'_> {
     /// Draws an image in a pass of its own: `pixel` gives the colour of the pixel at a column and row. What
     /// its lanes do is counted as they do it, in quads of 2 x 2 pixels: the n-th programs of the lanes of a
     /// warp run in step, and a lane without one, as beyond an odd side of the image, is a helper. Helpers
-    /// fetch what their neighbours fetch; they neither read nor write depth and colour.
+    /// read what their neighbours read; they neither read nor write depth and colour. The image lies in memory tile by
+    /// tile.
+    ///
+    /// # Errors
+    /// As [`Gpu::begin_conservative`], and [`PassError::Unstated`] if lanes access what `uses` does not state.
     pub fn shade_pixels(
         &mut self,
         name: &str,
         viewport: Viewport,
+        uses: Uses,
         pixel: impl Fn(&Lanes, [u32; 2]) -> Vec3 + Sync,
-    ) -> Rendered {
-        let image = self.allocate(viewport.pixels() as u64 * PIXEL_BYTES);
+    ) -> Result<Rendered, PassError> {
+        let tiles = Tiles { viewport, side: self.spec().tile_px };
+        let image = self.allocate(tiles.count() * tiles.pixels() * PIXEL_BYTES);
+        let uses = uses.targeting([image]);
+        self.check_uses(name, &uses)?;
         self.open(name, Some(viewport));
-        let colours = self.run_pixels(viewport, |lanes, [x, y]| {
-            let colour = pixel(lanes, [x, y]);
-            lanes.write(image, u64::from(y * viewport.width() + x) * PIXEL_BYTES, PIXEL_BYTES);
+        self.use_memory(uses);
+        let colours = self.run_pixels(viewport, |lanes, at| {
+            let colour = pixel(lanes, at);
+            lanes.write(image, tiles.place(at) * PIXEL_BYTES, PIXEL_BYTES);
             colour
-        });
+        })?;
         self.keep(image);
-        Rendered {
+        Ok(Rendered {
             images: vec![colours],
             visible: Vec::new(),
             counts: self.counts_of_pass(),
             passed: Vec::new(),
             region: image,
-        }
+        })
     }
 
     /// Runs a program for the pixel at every column and row, in the pass that was begun, in quads as
     /// [`Self::shade_pixels`]. Returns its values, row by row.
+    ///
+    /// # Errors
+    /// [`PassError::Unstated`] if lanes access memory that the pass does not state.
     pub fn run_pixels<T: Clone + Default + Send>(
         &mut self,
         viewport: Viewport,
         pixel: impl Fn(&Lanes, [u32; 2]) -> T + Sync,
-    ) -> Vec<T> {
+    ) -> Result<Vec<T>, PassError> {
         self.end_draws();
         let (side, warp_lanes) = (self.spec().tile_px, self.spec().warp_lanes);
         let columns: Vec<u32> = (0..viewport.width()).step_by(side as usize).collect();
         let mut values = vec![T::default(); viewport.pixels()];
         for y0 in (0..viewport.height()).step_by(side as usize) {
             if self.is_stopped() {
-                return values;
+                return Ok(values);
             }
             let run = |&x0: &u32| {
                 let (lanes, mut runs) = (Lanes::default(), TileRuns::new(side));
@@ -197,18 +210,22 @@ impl Gpu<'_> {
                 }
                 let tile = y0 / side * columns.len() as u32 + column;
                 let mut packet = self.packet(PacketKind::Tile, tile, None);
-                work.add_to(&mut packet.counts, self.memory(), |_| false);
+                self.access(&work, &mut packet.counts, |_| false)?;
                 let of = [viewport.width(), viewport.height()];
                 let end = [(*x0 + side).min(of[0]), (y0 + side).min(of[1])];
                 self.push_block(&packet, &Block { first: [*x0, y0], end, of });
             }
         }
-        values
+        Ok(values)
     }
 
     /// Writes the pixels of an image of `viewport` in a pass of its own, in tiles.
-    pub fn write_image(&mut self, name: &str, viewport: Viewport) {
+    ///
+    /// # Errors
+    /// [`PassError::Stopped`] and [`PassError::Memory`].
+    pub fn write_image(&mut self, name: &str, viewport: Viewport) -> Result<(), PassError> {
         let image = self.allocate(viewport.pixels() as u64 * PIXEL_BYTES);
+        self.check_frame(name)?;
         self.open(name, Some(viewport));
         let (pixels, tile_pixels) = (viewport.pixels() as u64, u64::from(self.spec().tile_px.pow(2)));
         for (tile, first) in (0..).zip((0..pixels).step_by(tile_pixels as usize)) {
@@ -222,6 +239,7 @@ impl Gpu<'_> {
             self.push(&packet, 0);
         }
         self.keep(image);
+        Ok(())
     }
 
     /// A packet of the pass that was begun.
@@ -234,6 +252,31 @@ impl Gpu<'_> {
             triangle: triangle.unwrap_or(Packet::NONE),
             ..Packet::new(kind, self.last_pass())
         }
+    }
+}
+
+/// Tiles of `side` pixels along a side, in rows.
+#[derive(Clone, Copy)]
+struct Tiles {
+    viewport: Viewport,
+    side: u32,
+}
+
+impl Tiles {
+    fn count(self) -> u64 {
+        let of = |size: u32| u64::from(size.div_ceil(self.side));
+        of(self.viewport.width()) * of(self.viewport.height())
+    }
+
+    /// Pixels of a tile.
+    fn pixels(self) -> u64 {
+        u64::from(self.side).pow(2)
+    }
+
+    /// Place of a pixel in memory, in pixels.
+    fn place(self, [x, y]: [u32; 2]) -> u64 {
+        let tile = u64::from(y / self.side * self.viewport.width().div_ceil(self.side) + x / self.side);
+        tile * self.pixels() + u64::from(y % self.side * self.side + x % self.side)
     }
 }
 

@@ -12,6 +12,7 @@ use super::heat::{Block, FrameHeat, HeatMap, Placement};
 use super::pass::{AddressMap, Draw, Pass, RasterPass, Resident, Target, resident};
 use super::replay::Replay;
 use super::seen::Seen;
+use super::uses::Uses;
 use super::{Finished, PipelineSpec, rasterize, resolve, seen};
 use crate::buffer::Buffers;
 use crate::geometry::Viewport;
@@ -26,18 +27,20 @@ type Emit<'e> = Box<dyn FnMut(&Packet, &[LineAccess]) + 'e>;
 /// number of threads.
 pub struct Gpu<'e> {
     spec: &'e PipelineSpec,
-    memory: MemorySystem,
+    pub(super) memory: MemorySystem,
     space: AddressSpace,
     emit: Emit<'e>,
     passes: Vec<PassReport>,
     /// Results of passes, which are in memory when the frame ends.
     results: Vec<MemoryRange>,
     /// Results since the last barrier: other units cannot read them yet.
-    pending: Vec<MemoryRange>,
+    pub(super) pending: Vec<MemoryRange>,
     /// Surfaces that passes may write and read.
     pub(super) surfaces: Surfaces,
     /// First addresses of what passes since the last barrier read: the reads may still be going on.
-    reads: Vec<u64>,
+    pub(super) reads: Vec<u64>,
+    /// What the shaders of the pass that was begun access, if it has no samples.
+    pub(super) uses: Uses,
     pub(super) buffers: Buffers,
     heat: FrameHeat,
     /// Whether the tiles of the pass that was begun are those of the heat maps.
@@ -175,6 +178,7 @@ impl<'e> Gpu<'e> {
             pending,
             surfaces: Surfaces::default(),
             reads,
+            uses: Uses::default(),
             buffers,
             heat,
             is_on_map: false,
@@ -285,6 +289,7 @@ impl<'e> Gpu<'e> {
         self.is_on_map = false;
         self.placement = None;
         self.draw = None;
+        self.uses = Uses::default();
     }
 
     /// What follows in the pass that was begun is of draw `number`.
@@ -307,7 +312,7 @@ impl<'e> Gpu<'e> {
 
     /// Whether a pass that reads or writes `region` has to wait for earlier ones.
     pub(super) fn conflicts(&self, region: MemoryRange, writes: bool) -> bool {
-        self.is_pending(region.address()) || (writes && self.is_read(region))
+        self.pending.iter().any(|pending| pending.overlaps(region)) || (writes && self.is_read(region))
     }
 
     /// Whether what is at `address` was written since the last barrier.
@@ -344,6 +349,11 @@ impl<'e> Gpu<'e> {
     /// Events of each draw of the last pass so far.
     pub(super) fn draws_of_pass(&self) -> &[Counts] {
         self.passes.last().map_or(&[], |pass| &pass.draws)
+    }
+
+    /// Name of the last pass.
+    pub(super) fn name_of_pass(&self) -> &str {
+        self.passes.last().map_or("", |pass| &pass.name)
     }
 
     /// Events of the last pass so far.
@@ -503,7 +513,7 @@ impl<'e> Gpu<'e> {
             self.surfaces.read_in(pass).filter_map(|id| Some(self.surfaces.get(id)?.region.address()));
         let buffers = pass.buffers().map(|binding| binding.region.address());
         Reads {
-            vertices: at.vertices.iter().map(|buffer| buffer.address).collect(),
+            vertices: at.vertices.iter().map(|buffer| buffer.vertices.address()).collect(),
             tiles: at.textures.iter().flatten().copied().chain(surfaces).chain(buffers).collect(),
         }
     }

@@ -12,41 +12,46 @@ use std::panic::Location;
 
 use activity::{Event, PacketCounts};
 
+use super::warps::Warps;
 use crate::depth::{Numbers, Real};
 use crate::geometry::Shear;
-use crate::memory::{LINE_BYTES, MemoryRange, MemorySystem};
+use crate::memory::{LINE_BYTES, MemoryRange};
 use crate::setup::Triangle;
 use crate::shader::Lane;
 use crate::tally::{Costs, Kernel};
 use crate::traversal::{TimeIntervals, time_interval_counted};
 
-/// Bytes of a word of depth.
+/// Bytes of a word.
 const WORD_BYTES: u64 = 4;
 
-/// Unit that accesses memory.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Client {
-    Depth,
-    Colour,
-    Texture,
+/// A line that the texture unit reads.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+struct Read {
+    /// How many loads its program made before, if it is one; `None` for a fetch.
+    load: Option<u32>,
+    line: u64,
 }
 
-/// An access to a range of a surface.
+/// A line that the units of depth or of colour access.
 #[derive(Clone, Copy, Debug)]
-struct Touch {
-    client: Client,
-    address: u64,
-    bytes: u64,
-    write: bool,
-    /// Whether the range is overwritten whole, so that nothing is fetched.
-    whole: bool,
+pub(super) struct TargetLine {
+    /// Address of the line.
+    pub line: u64,
+    /// Whether anything is written.
+    pub write: bool,
+    /// Whether all that is accessed is overwritten, so that nothing is fetched.
+    pub whole: bool,
 }
 
-impl Touch {
-    fn lines(&self) -> impl Iterator<Item = u64> + use<> {
-        let last = self.address + self.bytes.max(1) - 1;
-        (self.address / LINE_BYTES..=last / LINE_BYTES).map(|line| line * LINE_BYTES)
-    }
+/// Lines of a range.
+fn lines(address: u64, bytes: u64) -> impl Iterator<Item = u64> {
+    let last = address + bytes.max(1) - 1;
+    (address / LINE_BYTES..=last / LINE_BYTES).map(|line| line * LINE_BYTES)
+}
+
+/// Words of a range, the last of which may be a part of one.
+fn words(bytes: u64) -> u32 {
+    bytes.div_ceil(WORD_BYTES) as u32
 }
 
 /// A program that a lane ran.
@@ -56,19 +61,22 @@ pub(super) struct Run {
     program: &'static Location<'static>,
     /// Its operations.
     ops: u32,
-    /// Which accesses of the tile were made since the program before, up to its end.
-    touches: Range<usize>,
+    /// What it read: the reads since the program before, up to its end.
+    reads: Range<usize>,
 }
 
 /// The lanes that run for one tile.
 #[derive(Debug, Default)]
 pub struct Lanes {
     counts: RefCell<PacketCounts>,
-    touches: RefCell<Vec<Touch>>,
+    reads: RefCell<Vec<Read>>,
+    depths: RefCell<Vec<TargetLine>>,
+    colours: RefCell<Vec<TargetLine>>,
     /// Programs that were run and not counted so far.
     runs: RefCell<Vec<Run>>,
-    /// Accesses up to the end of the last program.
-    touched: Cell<usize>,
+    /// Reads up to the end of the last program, and loads since then.
+    ended: Cell<usize>,
+    loads: Cell<u32>,
     costs: Costs,
 }
 
@@ -89,14 +97,24 @@ impl Lanes {
     pub fn run<T>(&self, program: impl FnOnce(&Lane) -> T) -> T {
         let lane = Lane::knowing(&self.costs);
         let result = program(&lane);
-        let until = self.touches.borrow().len();
-        let touches = self.touched.replace(until)..until;
-        self.runs.borrow_mut().push(Run { program: Location::caller(), ops: lane.ops(), touches });
+        self.end_program(Location::caller(), lane.ops());
         result
     }
 
-    /// The programs since the last call, which are then not counted as those of single lanes.
+    /// Ends a program of `ops` operations besides its loads, which are one each.
+    fn end_program(&self, program: &'static Location<'static>, ops: u32) {
+        let until = self.reads.borrow().len();
+        let reads = self.ended.replace(until)..until;
+        self.runs.borrow_mut().push(Run { program, ops: ops + self.loads.take(), reads });
+    }
+
+    /// The programs since the last call, which are then not counted as those of single lanes. What was read after the
+    /// last of them is a program of its own.
+    #[track_caller]
     pub(super) fn take_runs(&self) -> Vec<Run> {
+        if self.reads.borrow().len() > self.ended.get() {
+            self.end_program(Location::caller(), 0);
+        }
         self.runs.take()
     }
 
@@ -104,6 +122,7 @@ impl Lanes {
     /// warp run in step, and each takes as long as the longest. A lane without an n-th program in a quad that
     /// has one is a helper.
     pub(super) fn count_quads(&self, quads: &[[Vec<Run>; 4]], warp_lanes: u32) {
+        let (all, mut read) = (self.reads.take(), Vec::new());
         for nth in 0..quads.as_flattened().iter().map(Vec::len).max().unwrap_or(0) {
             let mut warps = Warps::new(warp_lanes);
             for quad in quads {
@@ -111,61 +130,83 @@ impl Lanes {
                 let Some(longest) = lanes.iter().flatten().map(|run| run.ops).max() else { continue };
                 warps.start(lanes.len() as u32, longest);
                 self.count(Event::PixelInvocations, lanes.len() as u32);
-                let helpers = (0..lanes.len()).filter(|lane| lanes[*lane].is_none());
-                helpers.for_each(|lane| self.help(lane, lanes));
+                self.count(
+                    Event::HelperInvocations,
+                    lanes.iter().filter(|lane| lane.is_none()).count() as u32,
+                );
+                read.extend(self.read_by_quad(lanes, &all));
             }
             self.count(Event::ShaderOps, warps.ops());
         }
+        self.ended.set(read.len());
+        self.reads.replace(read);
     }
 
-    /// Counts a helper lane. Its fetches are those of a neighbour, as beyond the image coordinates are
+    /// What the lanes of a quad read with a program, as in passes of triangles: the n-th loads of the lanes are one
+    /// access, which reads a line once. A helper reads what a neighbour reads, as beyond the image coordinates are
     /// clamped to its border. Depth and colour of helpers are masked.
-    fn help(&self, lane: usize, lanes: [Option<&Run>; 4]) {
-        self.count(Event::HelperInvocations, 1);
-        let neighbour = [lane ^ 1, lane ^ 2, lane ^ 3].into_iter().find_map(|beside| lanes[beside]);
-        let Some(Run { touches, .. }) = neighbour else { return };
-        let mut all = self.touches.borrow_mut();
-        let fetched: Vec<Touch> =
-            all[touches.clone()].iter().filter(|touch| touch.client == Client::Texture).copied().collect();
-        self.count(Event::TextureFetches, fetched.len() as u32);
-        all.extend(fetched);
+    fn read_by_quad(&self, lanes: [Option<&Run>; 4], all: &[Read]) -> Vec<Read> {
+        let of_run = |run: Option<&Run>| run.map_or(&[][..], |run| &all[run.reads.clone()]);
+        let mut read: Vec<Read> = Vec::new();
+        for (at, lane) in lanes.iter().enumerate() {
+            let neighbour = || [at ^ 1, at ^ 2, at ^ 3].into_iter().find_map(|beside| lanes[beside]);
+            if lane.is_none() {
+                self.count(Event::TextureFetches, fetches(of_run(neighbour())));
+            }
+            read.extend(of_run(lane.or_else(neighbour)));
+        }
+        let (mut loads, mut read): (Vec<Read>, Vec<Read>) =
+            read.into_iter().partition(|read| read.load.is_some());
+        loads.sort_unstable();
+        loads.dedup();
+        read.extend(loads);
+        read
     }
 
-    /// Fetches `bytes` at an address through the texture unit.
+    /// Fetches a texel of `bytes` at an address. The texture unit does the work: it is no operation of the lane.
     pub fn fetch(&self, address: u64, bytes: u64) {
         self.count(Event::TextureFetches, 1);
-        self.touch(Touch { client: Client::Texture, address, bytes, write: false, whole: false });
+        self.read_lines(None, address, bytes);
+    }
+
+    /// Loads `bytes` of a buffer at an address, word by word, as [`Lane::load`] does: each is an operation and a fetch.
+    pub fn load(&self, address: u64, bytes: u64) {
+        let count = words(bytes);
+        self.count(Event::TextureFetches, count);
+        let first = self.loads.replace(self.loads.get() + count);
+        for word in 0..count {
+            self.read_lines(Some(first + word), address + u64::from(word) * WORD_BYTES, 1);
+        }
+    }
+
+    fn read_lines(&self, load: Option<u32>, address: u64, bytes: u64) {
+        self.reads.borrow_mut().extend(lines(address, bytes).map(|line| Read { load, line }));
     }
 
     /// Reads what is stored at the tile, through the depth unit, which works in the order of triangles.
     pub fn read(&self, target: MemoryRange, offset: u64, bytes: u64) {
-        self.count(Event::DepthReads, bytes.div_ceil(WORD_BYTES) as u32);
-        let address = target.address() + offset;
-        self.touch(Touch { client: Client::Depth, address, bytes, write: false, whole: false });
+        self.count(Event::DepthReads, words(bytes));
+        access(&self.depths, target.address() + offset, bytes, [false; 2]);
     }
 
     /// Combines a result with what is stored at the tile, through the depth unit.
     pub fn merge(&self, target: MemoryRange, offset: u64, bytes: u64) {
-        let words = bytes.div_ceil(WORD_BYTES) as u32;
-        self.count(Event::DepthReads, words);
-        self.count(Event::DepthWrites, words);
-        let address = target.address() + offset;
-        self.touch(Touch { client: Client::Depth, address, bytes, write: true, whole: false });
+        self.count(Event::DepthReads, words(bytes));
+        self.count(Event::DepthWrites, words(bytes));
+        access(&self.depths, target.address() + offset, bytes, [true, false]);
     }
 
     /// Adds a colour of `bytes` to the stored one.
     pub fn blend(&self, target: MemoryRange, offset: u64, bytes: u64) {
-        self.count(Event::ColourWrites, 1);
-        self.count(Event::SamplesBlended, 1);
-        let address = target.address() + offset;
-        self.touch(Touch { client: Client::Colour, address, bytes, write: true, whole: false });
+        self.count(Event::ColourWrites, words(bytes));
+        self.count(Event::SamplesBlended, words(bytes));
+        access(&self.colours, target.address() + offset, bytes, [true, false]);
     }
 
-    /// Writes a pixel of `bytes` of an image.
-    pub fn write(&self, image: MemoryRange, offset: u64, bytes: u64) {
-        self.count(Event::PixelsResolved, 1);
-        let address = image.address() + offset;
-        self.touch(Touch { client: Client::Colour, address, bytes, write: true, whole: true });
+    /// Writes a colour of `bytes`.
+    pub fn write(&self, target: MemoryRange, offset: u64, bytes: u64) {
+        self.count(Event::ColourWrites, words(bytes));
+        access(&self.colours, target.address() + offset, bytes, [true; 2]);
     }
 
     /// Times at which a point of the image is inside a moving triangle, by face: the sample test of all times
@@ -198,14 +239,10 @@ impl Lanes {
         self.counts.borrow_mut()[event] += count;
     }
 
-    fn touch(&self, touch: Touch) {
-        self.touches.borrow_mut().push(touch);
-    }
-
     /// What the lanes did since the last call. Those of a program fill warps of `warp_lanes` lanes in
     /// the order in which they ran.
     pub(super) fn finish(&self, warp_lanes: u32) -> LaneWork {
-        let runs = self.runs.take();
+        let runs = self.take_runs();
         let mut programs: Vec<(&Location<'_>, Warps)> = Vec::new();
         for Run { program, ops, .. } in &runs {
             let place = programs.iter().position(|(known, _)| known == program).unwrap_or(programs.len());
@@ -216,9 +253,38 @@ impl Lanes {
         }
         self.count(Event::PixelInvocations, runs.len() as u32);
         self.count(Event::ShaderOps, programs.into_iter().map(|(_, warps)| warps.ops()).sum());
-        self.touched.set(0);
-        LaneWork { counts: self.counts.take(), touches: self.touches.take() }
+        self.ended.set(0);
+        LaneWork {
+            counts: self.counts.take(),
+            reads: self.reads.take().into_iter().map(|read| read.line).collect(),
+            depths: merged(self.depths.take()),
+            colours: merged(self.colours.take()),
+        }
     }
+}
+
+/// Fetches of the texture unit that made these reads.
+fn fetches(reads: &[Read]) -> u32 {
+    reads.chunk_by(|a, b| a.load.is_some() && a.load == b.load).count() as u32
+}
+
+/// Adds the lines of a range to those of a unit; `write` and `whole` as in [`TargetLine`].
+fn access(unit: &RefCell<Vec<TargetLine>>, address: u64, bytes: u64, [write, whole]: [bool; 2]) {
+    unit.borrow_mut().extend(lines(address, bytes).map(|line| TargetLine { line, write, whole }));
+}
+
+/// Each line once, by address: a packet accesses a line of a target once, as in passes of triangles.
+fn merged(mut lines: Vec<TargetLine>) -> Vec<TargetLine> {
+    lines.sort_by_key(|access| access.line);
+    lines.dedup_by(|next, kept| {
+        let same = next.line == kept.line;
+        if same {
+            kept.write |= next.write;
+            kept.whole &= next.whole;
+        }
+        same
+    });
+    lines
 }
 
 /// Whether a point is on the inner side of each edge of a triangle, or off by `slack` at most.
@@ -237,90 +303,11 @@ fn is_inside<N: Numbers>(numbers: N, corners: &[[f64; 2]; 3], at: [f64; 2], slac
 /// What the lanes of some tiles did.
 #[derive(Clone, Debug, Default)]
 pub(super) struct LaneWork {
-    counts: PacketCounts,
-    touches: Vec<Touch>,
-}
-
-impl LaneWork {
-    /// Adds the counts, and the accesses in order. `is_cleared` says whether a line has held nothing but the
-    /// clear value so far.
-    pub fn add_to(
-        &self,
-        counts: &mut PacketCounts,
-        memory: &mut MemorySystem,
-        mut is_cleared: impl FnMut(u64) -> bool,
-    ) {
-        *counts += &self.counts;
-        for touch in &self.touches {
-            touch.lines().for_each(|line| match touch.client {
-                Client::Texture => memory.texture(line, counts),
-                Client::Depth => memory.depth(line, touch.write, is_cleared(line), counts),
-                Client::Colour => {
-                    memory.colour(line, touch.write, touch.whole || is_cleared(line), counts);
-                }
-            });
-        }
-    }
-}
-
-/// Lanes of one packet, put into warps in the order in which they start. Each lane of a warp takes as long as
-/// the longest. A warp that is not full has no other lanes: warps of other packets issue beside it.
-#[derive(Debug)]
-pub(super) struct Warps {
-    /// Lanes of a full warp.
-    lanes: u32,
-    /// Lanes of the warp that is being filled, and operations of its longest.
-    filled: u32,
-    longest: u32,
-    /// Operations of the warps before it.
-    ops: u32,
-}
-
-impl Warps {
-    /// No warps so far, of up to `lanes` lanes.
-    pub fn new(lanes: u32) -> Self {
-        Self { lanes, filled: 0, longest: 0, ops: 0 }
-    }
-
-    /// Starts some lanes in one warp, the longest of which takes `ops`. More than a warp has are a warp of their own.
-    pub fn start(&mut self, lanes: u32, ops: u32) {
-        if self.filled + lanes > self.lanes {
-            self.end();
-        }
-        self.filled += lanes;
-        self.longest = self.longest.max(ops);
-    }
-
-    fn end(&mut self) {
-        self.ops += self.filled * self.longest;
-        (self.filled, self.longest) = (0, 0);
-    }
-
-    /// Operations of all lanes.
-    pub fn ops(mut self) -> u32 {
-        self.end();
-        self.ops
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn ops(lanes: u32, started: &[(u32, u32)]) -> u32 {
-        let mut warps = Warps::new(lanes);
-        started.iter().for_each(|&(lanes, ops)| warps.start(lanes, ops));
-        warps.ops()
-    }
-
-    #[test]
-    fn a_warp_takes_as_long_as_its_longest_lane() {
-        assert_eq!(ops(8, &[(4, 3), (4, 10), (4, 5)]), 8 * 10 + 4 * 5);
-        assert_eq!(ops(8, &[(1, 3), (1, 4), (1, 1)]), 3 * 4);
-        // Quads are not torn apart.
-        assert_eq!(ops(6, &[(4, 3), (4, 10)]), 4 * 3 + 4 * 10);
-        // A warp of fewer lanes than a quad runs quads one by one.
-        assert_eq!(ops(2, &[(4, 3), (4, 10)]), 4 * 3 + 4 * 10);
-        assert_eq!(ops(32, &[]), 0);
-    }
+    pub counts: PacketCounts,
+    /// Lines that the texture unit reads, in order.
+    pub reads: Vec<u64>,
+    /// Lines that the depth unit accesses.
+    pub depths: Vec<TargetLine>,
+    /// Lines that the colour unit accesses.
+    pub colours: Vec<TargetLine>,
 }

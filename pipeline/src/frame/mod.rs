@@ -22,6 +22,8 @@ mod shaded;
 mod target_checks;
 mod test_selection;
 mod tile_tests;
+mod uses;
+mod warps;
 mod worker;
 
 use std::ops::Range;
@@ -46,6 +48,7 @@ use replay::Replay;
 pub use resolve_pass::ResolvePass;
 pub use settings::{Features, PipelineSpec, PipelineSpecError, Settings, Shading};
 use test_selection::TestSelector;
+pub use uses::Uses;
 use worker::BinWorker;
 
 /// A unit of finished work, in the order of the modelled hardware.

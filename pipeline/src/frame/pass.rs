@@ -438,8 +438,8 @@ pub(super) fn resident<'s>(
             let (count, stride) = (draw.geometry.open().len() as u64, draw.geometry.vertex_bytes());
             let triangles = draw.geometry.triangles().len() as u64;
             let new = || {
-                let address = space.take(count * u64::from(stride)).address();
-                VertexBuffer { address, stride, indices: space.take(triangles * INDEX_BYTES).address() }
+                let vertices = space.take(count * u64::from(stride));
+                VertexBuffer { vertices, stride, indices: space.take(triangles * INDEX_BYTES) }
             };
             draw.resident.vertices.unwrap_or_else(new)
         })
@@ -518,11 +518,17 @@ impl<'a> Draw<'a> {
     /// Addresses and bytes of the indices of a triangle and of the positions of its vertices, for programs
     /// that read them; `None` unless the draw is [resident](super::Gpu::resident) and has the triangle.
     pub fn data_of(&self, triangle: u32) -> Option<[(u64, u64); 4]> {
-        let VertexBuffer { address, stride, indices } = self.resident.vertices?;
+        let VertexBuffer { vertices, stride, indices } = self.resident.vertices?;
         let corners = self.geometry.triangles().get(triangle as usize)?;
         let bytes = if self.geometry.is_still() { POSITION_BYTES } else { 2 * POSITION_BYTES };
-        let [a, b, c] = corners.map(|vertex| (address + u64::from(vertex) * u64::from(stride), bytes));
-        Some([(indices + u64::from(triangle) * INDEX_BYTES, INDEX_BYTES), a, b, c])
+        let [a, b, c] =
+            corners.map(|vertex| (vertices.address() + u64::from(vertex) * u64::from(stride), bytes));
+        Some([(indices.address() + u64::from(triangle) * INDEX_BYTES, INDEX_BYTES), a, b, c])
+    }
+
+    /// Where its vertices and indices are; `None` unless it is resident.
+    pub fn ranges(&self) -> Option<[MemoryRange; 2]> {
+        self.resident.vertices.map(|VertexBuffer { vertices, indices, .. }| [vertices, indices])
     }
 
     /// The draw with the texture of its shader in `region`, as an earlier pass wrote it.
@@ -533,14 +539,14 @@ impl<'a> Draw<'a> {
 }
 
 /// Vertices and indices in memory. A pass that draws them at one time of the shutter still reads both ends.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct VertexBuffer {
-    /// First byte.
-    pub address: u64,
+    /// The vertices.
+    pub vertices: MemoryRange,
     /// Bytes of a vertex.
     pub stride: u32,
-    /// First byte of the indices.
-    pub indices: u64,
+    /// The indices.
+    pub indices: MemoryRange,
 }
 
 /// Addresses of a draw's data.

@@ -227,7 +227,16 @@ impl Gpu<'_> {
     /// Gathers the farthest depths of `stored`, the result of a pass over depth, in a pass of its own. It
     /// needs no wait, as the unit of depth works in order: every stored depth is read and compared once, and
     /// the farthest of each box of a tile are compared for the next level. They are kept in fast memory.
-    pub fn gather_farthest_depths(&mut self, name: &str, pyramid: &Pyramid, stored: MemoryRange) {
+    ///
+    /// # Errors
+    /// [`PassError::Stopped`] and [`PassError::Memory`].
+    pub fn gather_farthest_depths(
+        &mut self,
+        name: &str,
+        pyramid: &Pyramid,
+        stored: MemoryRange,
+    ) -> Result<(), PassError> {
+        self.check_frame(name)?;
         let placement = self.has_heat_of(pyramid.viewport()).then(|| placement(pyramid));
         self.open_placed(name, placement);
         self.note_read(stored.address());
@@ -254,18 +263,23 @@ impl Gpu<'_> {
                 self.push_block(&packet, &block(pyramid, level, at));
             }
         }
+        Ok(())
     }
 
     /// Queries boxes in a pass of its own, each as a draw. A query ends at its first tile that may see the box. The
     /// unit of depth writes the answers to memory, a word each.
+    ///
+    /// # Errors
+    /// [`PassError::Stopped`] and [`PassError::Memory`].
     pub fn query_boxes(
         &mut self,
         name: &str,
         queries: &IntervalQueries<'_>,
         objects: &[MovingBox],
-    ) -> Vec<IntervalAnswer> {
+    ) -> Result<Vec<IntervalAnswer>, PassError> {
         let corners = self.allocate(objects.len() as u64 * u64::from(CORNERS * CORNER_BYTES));
         let written = self.allocate(objects.len() as u64 * ANSWER_BYTES);
+        self.check_frame(name)?;
         self.open(name, None);
         let answers: Vec<_> = objects.iter().map(|object| queries.query(object)).collect();
         let size = self.spec().batch_triangles;
@@ -279,7 +293,7 @@ impl Gpu<'_> {
             boxes.iter().for_each(|&(number, answer)| self.box_tiles(number, answer, written));
         }
         self.keep(written);
-        answers
+        Ok(answers)
     }
 
     /// Writes the answer of query `number`. Answers follow each other, so the first of a line needs none of

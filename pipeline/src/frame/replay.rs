@@ -4,10 +4,10 @@ use activity::{Event, LineAccess, Packet, PacketCounts, PacketKind};
 
 use super::Shading;
 use super::bin::{Bin, BinLog, BinMemory, Work};
-use super::lanes::Warps;
 use super::pass::{INDEX_BYTES, Pass, Plane, Query, SAMPLE_BYTES, VertexBuffer};
 use super::resolve::{SampleLine, TileResolve, tile_lines};
 use super::shaded::{QuadWork, ShadedTriangle};
+use super::warps::Warps;
 use crate::memory::{AccessOutcome, Cache, CacheError, LINE_BYTES, MemorySystem};
 use crate::random::mix;
 use crate::sampling::Sample;
@@ -97,8 +97,8 @@ impl<'a> Replay<'a> {
     pub fn vertices(&mut self, draw: usize, triangle: u32, counts: &mut PacketCounts) {
         let geometry = &self.pass.draws[draw].geometry;
         let ops = self.pass.projection.vertex_ops() + self.pass.programs[draw].vertex_ops;
-        let VertexBuffer { address, stride: bytes, indices } = self.pass.addresses.vertices[draw];
-        self.indices(indices + self.pass.locate(triangle).1 as u64 * INDEX_BYTES, counts);
+        let VertexBuffer { vertices, stride: bytes, indices } = self.pass.addresses.vertices[draw];
+        self.indices(indices.address() + self.pass.locate(triangle).1 as u64 * INDEX_BYTES, counts);
         let ends = if geometry.is_still() && self.pass.still_camera { 1 } else { 2 };
         for vertex in self.pass.corners(triangle).1 {
             if self.reuse.contains_or_insert((draw, vertex as u32)) {
@@ -108,7 +108,7 @@ impl<'a> Replay<'a> {
             counts[Event::VertexBytes] += bytes;
             counts[Event::VertexInvocations] += 1;
             counts[Event::ShaderOps] += ends * ops;
-            let at = address + vertex as u64 * u64::from(bytes);
+            let at = vertices.address() + vertex as u64 * u64::from(bytes);
             self.memory.vertices(at, u64::from(bytes), counts);
         }
     }

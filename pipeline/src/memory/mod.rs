@@ -39,6 +39,11 @@ impl MemoryRange {
     pub fn contains(&self, address: u64) -> bool {
         (self.first..self.first + self.bytes).contains(&address)
     }
+
+    /// Whether both have bytes in common.
+    pub(crate) fn overlaps(&self, other: Self) -> bool {
+        self.first.max(other.first) < (self.first + self.bytes).min(other.first + other.bytes)
+    }
 }
 
 /// Addresses of a frame, handed out one after the other.

@@ -4,7 +4,7 @@
 use std::sync::atomic::{AtomicU32, Ordering};
 
 use crate::common::*;
-use activity::{Counts, Event, PacketKind};
+use activity::{Counts, Event, PacketKind, Waits};
 use glam::Vec3;
 use pipeline::conservative::{Grid, MovingTriangle, Rasterizer, View};
 use pipeline::memory::MemoryRange;
@@ -57,10 +57,11 @@ fn drawn(primitives: &[Primitive], block: u32) -> (Vec<Tile>, Vec<PacketKind>, C
     .unwrap();
     let [target, vertices] = [64 * 4, 3 * 24 * primitives.len() as u64].map(|bytes| gpu.allocate(bytes));
     let shader = Merge { target, runs: AtomicU32::new(0) };
-    let mut pass = gpu.begin_conservative("boxes", None);
+    let uses = Uses::default().targeting([target]);
+    let mut pass = gpu.begin_conservative("boxes", None, uses).unwrap();
     let draw =
         ConservativeDraw { primitives, grid: &GRID, block, vertices, vertex_bytes: 24, projection: None };
-    pass.draw(&mut gpu, &draw, &shader, |tile, z| found.push((tile, z)));
+    pass.draw(&mut gpu, &draw, &shader, |tile, z| found.push((tile, z))).unwrap();
     let report = gpu.finish();
     assert_eq!(report.counts(), sum);
     assert_eq!(report.triangles(), primitives.iter().filter(|primitive| !primitive.reuses_vertices).count());
@@ -88,8 +89,8 @@ fn a_still_triangle_is_counted_by_hand() {
     assert!(parts.iter().all(|madds| *madds > 0));
     assert_eq!(counts[Event::TileMadds], parts.iter().sum::<u64>());
     assert!(counts[Event::DepthIntervalMadds] > 0);
-    // Two rows of eight tiles are 64 bytes: one line.
-    assert_eq!(counts[Event::DepthLines], 7);
+    // Two rows of eight tiles are 64 bytes: one line, which a packet accesses once.
+    assert_eq!(counts[Event::DepthLines], 1);
     assert_eq!(counts[Event::DepthMisses], 1);
     assert_eq!(kinds[..2], [PacketKind::Draw, PacketKind::Vertices]);
 }
@@ -145,6 +146,38 @@ fn the_tiles_are_those_of_the_rasterizer() {
     }
 }
 
+/// Where no depths are found, the same tiles are there, and those that depths cull; u, v and t are as wide or wider.
+#[test]
+fn tiles_without_depths_have_those_with() {
+    let uniform = |n: u64| 12.0 * unit(mix(n)) - 2.0;
+    let view = View::Perspective { s: [2.0, -2.0], a: [0.5, -0.5], near: 0.25 };
+    let mut culled = 0;
+    for n in 0..300 {
+        let corner = |k: u64| [0, 1, 2].map(|axis| uniform(18 * n + 3 * k + axis));
+        let triangle = MovingTriangle::new([0, 1, 2].map(corner), [3, 4, 5].map(corner)).unwrap();
+        let tiles = |rasterizer: Rasterizer| {
+            let (mut tiles, mut madds) = (Vec::new(), 0);
+            let rest = rasterizer.rasterize_counted(&triangle, &GRID, [0..8, 0..8], |tile, touch, work| {
+                madds += std::mem::take(work).depth_madds;
+                tiles.push((tile, *touch));
+            });
+            (tiles, madds + rest.depth_madds)
+        };
+        let (with, madds) = tiles(Rasterizer::new(view));
+        let (without, none) = tiles(Rasterizer::new(view).without_depths());
+        assert!(madds > 0 && none == 0, "{n}");
+        culled += without.len() - with.len();
+        for (tile, touch) in with {
+            let (_, wider) = without.iter().find(|(other, _)| *other == tile).unwrap();
+            for ([lo, hi], [low, high]) in [(touch.u, wider.u), (touch.v, wider.v), (touch.t, wider.t)] {
+                assert!(low <= lo && hi <= high, "{n} {tile:?}");
+            }
+            assert_eq!(wider.z, [0.25, f64::INFINITY], "{n}");
+        }
+    }
+    assert!(culled > 0);
+}
+
 /// Lanes of a warp run in step: it takes as long as its longest lane, for each program that any of them runs.
 /// Lanes of tiles in conservative mode have no helpers.
 #[test]
@@ -153,24 +186,26 @@ fn lanes_of_a_full_screen_pass_wait_for_their_warp() {
     let spec = spec(Features::ALL);
     let wait = |spec: &PipelineSpec, at: [u32; 2]| {
         let mut gpu = Gpu::without_packets(spec).unwrap();
-        let drawn = gpu.shade_pixels("wait", Viewport::new(16, 8).unwrap(), |lanes, pixel| {
-            let ops = if pixel == at { 50 } else { 3 };
-            lanes.run(|lane| (0..ops).for_each(|_| assert!(lane.add(1.0, 2.0) > 0.0)));
-            Vec3::ZERO
-        });
-        drawn.counts[Event::ShaderOps]
+        let drawn =
+            gpu.shade_pixels("wait", Viewport::new(16, 8).unwrap(), Uses::default(), |lanes, pixel| {
+                let ops = if pixel == at { 50 } else { 3 };
+                lanes.run(|lane| (0..ops).for_each(|_| assert!(lane.add(1.0, 2.0) > 0.0)));
+                Vec3::ZERO
+            });
+        drawn.unwrap().counts[Event::ShaderOps]
     };
     // One lane of 128 takes longer, and its quad or its warp of eight quads with it.
     assert_eq!(wait(&quads, [5, 3]), 3 * 124 + 4 * 50);
     assert_eq!(wait(&spec, [5, 3]), 3 * 96 + 32 * 50);
     let counts = |programs: fn([u32; 2]) -> Vec<u32>| {
         let mut gpu = Gpu::without_packets(&spec).unwrap();
-        let drawn = gpu.shade_pixels("steps", Viewport::new(16, 8).unwrap(), |lanes, at| {
+        let drawn = gpu.shade_pixels("steps", Viewport::new(16, 8).unwrap(), Uses::default(), |lanes, at| {
             for ops in programs(at) {
                 lanes.run(|lane| (0..ops).for_each(|_| assert!(lane.add(1.0, 2.0) > 0.0)));
             }
             Vec3::ZERO
         });
+        let drawn = drawn.unwrap();
         [Event::PixelInvocations, Event::HelperInvocations, Event::ShaderOps].map(|event| drawn.counts[event])
     };
     assert_eq!(counts(|_| vec![3]), [128, 0, 3 * 128]);
@@ -192,12 +227,17 @@ fn a_full_screen_pass_runs_every_pixel() {
     let viewport = Viewport::new(21, 13).unwrap();
     let mut gpu = Gpu::without_packets(&spec).unwrap();
     let source = gpu.allocate(4096);
-    let drawn = gpu.shade_pixels("grey", viewport, |lanes, [x, y]| {
+    let drawn = gpu.shade_pixels("grey", viewport, Uses::default().reading([source]), |lanes, [x, y]| {
         lanes.fetch(source.address(), 4);
         lanes.run(|lane| Vec3::splat(lane.add(x as f32, y as f32)))
     });
-    let pixels = 21 * 13;
-    assert_eq!(drawn.counts[Event::PixelsResolved], pixels);
+    let (drawn, pixels) = (drawn.unwrap(), 21 * 13);
+    // Three by two tiles of 256 bytes, of whose 24 lines those below the image hold no pixels.
+    assert_eq!(
+        [Event::ColourWrites, Event::ColourLines].map(|event| drawn.counts[event]),
+        [pixels, 3 * 4 + 3 * 3]
+    );
+    assert_eq!(drawn.counts[Event::PixelsResolved], 0);
     // Quads of 2x2: eleven across and seven down, whose lanes beyond the image are helpers.
     let lanes = 4 * 11 * 7;
     assert_eq!((drawn.counts[Event::PixelInvocations], drawn.counts[Event::ShaderOps]), (lanes, lanes));
@@ -205,8 +245,135 @@ fn a_full_screen_pass_runs_every_pixel() {
     // Helpers fetch what their neighbours do, one line each.
     assert_eq!((drawn.counts[Event::TextureFetches], drawn.counts[Event::TextureLines]), (lanes, lanes));
     assert_eq!(drawn.into_image()[21 * 5 + 7], Vec3::splat(12.0));
-    gpu.write_image("copy", viewport);
-    assert_eq!(gpu.finish().counts()[Event::PixelsResolved], 2 * pixels);
+    gpu.write_image("copy", viewport).unwrap();
+    assert_eq!(gpu.finish().counts()[Event::PixelsResolved], pixels);
+}
+
+/// Lanes of a quad share the lines of their n-th loads, as in passes of triangles; fetches of texels each access theirs.
+/// A load is an operation and a fetch for each of its words.
+#[test]
+fn loads_of_a_quad_share_lines() {
+    let (spec, viewport) = (spec(Features::ALL), Viewport::new(16, 8).unwrap());
+    let read = |each: fn(&Lanes, u64)| {
+        let mut gpu = Gpu::without_packets(&spec).unwrap();
+        let source = gpu.allocate(4096);
+        let uses = Uses::default().reading([source]);
+        let drawn = gpu.shade_pixels("read", viewport, uses, |lanes, _| {
+            lanes.run(|lane| {
+                each(lanes, source.address());
+                Vec3::splat(lane.add(1.0, 2.0))
+            })
+        });
+        let counts = drawn.unwrap().counts;
+        [Event::TextureFetches, Event::TextureLines, Event::ShaderOps].map(|event| counts[event])
+    };
+    assert_eq!(read(|lanes, at| lanes.fetch(at, 16)), [128, 128, 128]);
+    assert_eq!(read(|lanes, at| lanes.load(at, 12)), [3 * 128, 3 * 32, 4 * 128]);
+    // The third word is in the next line.
+    assert_eq!(read(|lanes, at| lanes.load(at + 56, 12)), [3 * 128, 3 * 32, 4 * 128]);
+    let thrice = |lanes: &Lanes, at| {
+        lanes.load(at, 4);
+        lanes.fetch(at, 4);
+        lanes.load(at, 4);
+    };
+    assert_eq!(read(thrice), [3 * 128, 2 * 32 + 128, 3 * 128]);
+}
+
+/// A pass waits for those that write what it reads, with its tiles alone, and for those that read what it writes.
+#[test]
+fn dependencies_follow_from_the_uses() {
+    let (spec, viewport) = (spec(Features::ALL), Viewport::new(16, 8).unwrap());
+    let waits = |first: fn(MemoryRange) -> Uses, second: fn(MemoryRange) -> Uses| {
+        let mut waits = Vec::new();
+        let mut gpu = Gpu::new(&spec, |packet, _| {
+            if let PacketKind::Barrier(of) = packet.kind {
+                waits.push((packet.pass, of));
+            }
+        })
+        .unwrap();
+        let range = gpu.allocate(4096);
+        gpu.begin_conservative("first", None, first(range)).unwrap();
+        gpu.shade_pixels("second", viewport, second(range), |_, _| Vec3::ZERO).unwrap();
+        drop(gpu);
+        waits
+    };
+    let (reads, writes) =
+        (|range| Uses::default().reading([range]), |range| Uses::default().targeting([range]));
+    assert_eq!(waits(writes, reads), [(1, Waits::Tiles)]);
+    assert_eq!(waits(reads, writes), [(1, Waits::Tiles)]);
+    assert_eq!(waits(reads, reads), []);
+    // The units of depth and colour work in order.
+    assert_eq!(waits(writes, writes), []);
+}
+
+/// Vertices that an earlier pass wrote let the front end wait, too.
+#[test]
+fn written_vertices_are_waited_for() {
+    let spec = spec(Features::ALL);
+    let mut waits = Vec::new();
+    let mut gpu = Gpu::new(&spec, |packet, _| {
+        if let PacketKind::Barrier(of) = packet.kind {
+            waits.push((packet.pass, of));
+        }
+    })
+    .unwrap();
+    let [target, vertices] = [64 * 4, 72].map(|bytes| gpu.allocate(bytes));
+    let corners = [[0.5, 0.5, 2.0], [3.5, 0.5, 2.0], [0.5, 1.5, 4.0]];
+    let primitives = [primitive([corners; 2], 0)];
+    let draw = ConservativeDraw {
+        primitives: &primitives,
+        grid: &GRID,
+        block: 8,
+        vertices,
+        vertex_bytes: 24,
+        projection: None,
+    };
+    let shader = Merge { target, runs: AtomicU32::new(0) };
+    gpu.begin_conservative("vertices", None, Uses::default().targeting([vertices])).unwrap();
+    let mut pass = gpu.begin_conservative("triangles", None, Uses::default().targeting([target])).unwrap();
+    for _ in 0..2 {
+        pass.draw(&mut gpu, &draw, &shader, |_, _| ()).unwrap();
+    }
+    // What the pass writes is still to be waited for.
+    gpu.shade_pixels("read", Viewport::new(8, 8).unwrap(), Uses::default().reading([target]), |_, _| {
+        Vec3::ZERO
+    })
+    .unwrap();
+    drop(gpu);
+    assert_eq!(waits, [(1, Waits::All), (2, Waits::Tiles)]);
+}
+
+/// Memory that a pass reads and writes, and accesses that it does not state, are errors.
+#[test]
+fn uses_are_checked() {
+    let (spec, viewport) = (spec(Features::ALL), Viewport::new(8, 8).unwrap());
+    let mut gpu = Gpu::without_packets(&spec).unwrap();
+    let [range, other] = [(); 2].map(|()| gpu.allocate(256));
+    let both = Uses::default().reading([other, range]).targeting([range]);
+    let refused = gpu.begin_conservative("light", None, both).unwrap_err();
+    assert!(
+        refused.to_string().starts_with("pass `light`: its texture unit reads the 256 bytes from address")
+    );
+    let mut run = |uses: Uses, each: fn(&Lanes, MemoryRange)| {
+        let drawn = gpu.shade_pixels("look", viewport, uses, |lanes, _| {
+            each(lanes, range);
+            Vec3::ZERO
+        });
+        drawn.map(|_| ())
+    };
+    let unstated = Err(PassError::Unstated { pass: "look".to_owned(), line: range.address() });
+    let (reads, targets) =
+        (|| Uses::default().reading([range]), || Uses::default().targeting([range, other]));
+    for (uses, is_read) in [(Uses::default(), false), (reads(), true), (targets(), false)] {
+        let expected = if is_read { Ok(()) } else { unstated.clone() };
+        assert_eq!(run(uses.clone(), |lanes, range| lanes.load(range.address(), 4)), expected);
+        assert_eq!(run(uses, |lanes, range| lanes.fetch(range.address(), 4)), expected);
+    }
+    for (uses, is_target) in [(Uses::default(), false), (reads(), false), (targets(), true)] {
+        let expected = if is_target { Ok(()) } else { unstated.clone() };
+        assert_eq!(run(uses.clone(), |lanes, range| lanes.merge(range, 0, 4)), expected);
+        assert_eq!(run(uses, |lanes, range| lanes.blend(range, 0, 4)), expected);
+    }
 }
 
 /// Runs a program of 2 + column operations for every tile, and then one of 100.
@@ -241,8 +408,8 @@ fn lanes_of_tiles_wait_for_those_of_their_program() {
             vertex_bytes: 24,
             projection: None,
         };
-        let mut pass = gpu.begin_conservative("two", None);
-        pass.draw(&mut gpu, &draw, &TwoPrograms, |_, tile| tiles.push(tile));
+        let mut pass = gpu.begin_conservative("two", None, Uses::default()).unwrap();
+        pass.draw(&mut gpu, &draw, &TwoPrograms, |_, tile| tiles.push(tile)).unwrap();
         assert_eq!(tiles.len(), 7);
         (tiles, gpu.finish().counts()[Event::ShaderOps])
     };
@@ -267,7 +434,8 @@ fn heat_maps_have_the_work_on_tiles_in_their_pixels() {
         let [target, vertices] = [64 * 4, 3 * 24 * 2].map(|bytes| gpu.allocate(bytes));
         let shader = Merge { target, runs: AtomicU32::new(0) };
         let placement = Placement { first: [0.5, 1.0], last: [1.0, 0.0] };
-        let mut pass = gpu.begin_conservative("boxes", Some(placement));
+        let mut pass =
+            gpu.begin_conservative("boxes", Some(placement), Uses::default().targeting([target])).unwrap();
         let draw = ConservativeDraw {
             primitives: &primitives,
             grid: &GRID,
@@ -276,7 +444,7 @@ fn heat_maps_have_the_work_on_tiles_in_their_pixels() {
             vertex_bytes: 24,
             projection: None,
         };
-        pass.draw(&mut gpu, &draw, &shader, |_, _| ());
+        pass.draw(&mut gpu, &draw, &shader, |_, _| ()).unwrap();
         let report = gpu.finish();
         let counts = report.counts();
         for map in &report.heat {

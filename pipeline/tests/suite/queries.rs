@@ -216,7 +216,7 @@ fn answers_reach_memory() {
     let pyramid = Pyramid::new(stage.viewport, &stage.table, &depths, 8, grid);
     let projection = Projection::new(&stage.camera, stage.viewport);
     let mut gpu = Gpu::without_packets(&spec).unwrap();
-    gpu.query_boxes("queries", &IntervalQueries::new(&pyramid, &projection), &boxes);
+    gpu.query_boxes("queries", &IntervalQueries::new(&pyramid, &projection), &boxes).unwrap();
     let report = gpu.finish();
     assert_eq!(written(&report), [21, 128]);
     let [pass] = &report.passes[..] else { unreachable!() };

@@ -237,7 +237,7 @@ impl<'a> Cover<'a> {
     fn moving(&mut self, seen: &Seen) {
         let [open, close] = [seen.image.open, seen.image.close].map(|end| end.map(|p| p.to_array()));
         let Some(triangle) = MovingTriangle::new(open, close) else { return };
-        let rasterizer = Rasterizer::new(View::orthographic()).halving(MAX_HALVINGS);
+        let rasterizer = Rasterizer::new(View::orthographic()).halving(MAX_HALVINGS).without_depths();
         let (eye, grid) = (self.eye, self.grid);
         rasterizer.rasterize(&triangle, &grid, |tile, touch| {
             let reach = reach(&Lane::default(), seen, touch);
@@ -261,7 +261,7 @@ impl<'a> Cover<'a> {
         }
         let Some(triangle) = MovingTriangle::new(corners, corners) else { return };
         let grid = self.grid;
-        Rasterizer::new(View::orthographic()).rasterize(&triangle, &grid, |tile, _| {
+        Rasterizer::new(View::orthographic()).without_depths().rasterize(&triangle, &grid, |tile, _| {
             self.test(tile, &reach, |at| {
                 [(0, 1), (1, 2), (2, 0)].iter().all(|&(i, j)| edge(i, j, at) >= -slack)
             });

@@ -169,7 +169,7 @@ impl Draws for Caustics {
         let mut warnings = accuracy_warnings(&self.ocean, &beams);
         warnings.extend(from_host(gpu.spec()));
         Ok(Drawn {
-            image: tone_on(gpu, &eye, &picture.light, buffer, white(&picture.light)),
+            image: tone_on(gpu, &eye, &picture.light, buffer, white(&picture.light))?,
             moving: method == BeamMethod::Moving,
             lens: false,
             facts: facts(&picture, &beams),

@@ -79,7 +79,6 @@ pub(super) fn refract_on(
         bindings: &[words.reads(), buffer.words.writes()],
         shader: &Joining { ocean, stored, corners: &corners, buffer },
     })?;
-    gpu.wait();
     Ok((beams, buffer))
 }
 

@@ -7,7 +7,7 @@ use pipeline::memory::MemoryRange;
 use pipeline::traversal::TimeIntervals;
 use pipeline::{
     Atomic, Buffer, ComputePass, ConservativeDraw, Gpu, Group, GroupLane, GroupShader, Lane, Lanes,
-    PassError, Placement, Primitive, TileIntervals, TileShader,
+    PassError, Placement, Primitive, TileIntervals, TileShader, Uses,
 };
 
 use super::bound::BoundingVolume;
@@ -51,22 +51,26 @@ impl LightBuffer {
     }
 }
 
-/// Draws the light in colours, in a pass that reads it; `white` is white. The host has read the light to find that.
+/// Draws the light in colours, in a pass that reads it; `white` is white.
+///
+/// # Errors
+/// [`PassError`] if the GPU refuses the pass.
 pub(super) fn tone_on(
     gpu: &mut Gpu<'_>,
     eye: &Eye,
     light: &[f64],
     buffer: LightBuffer,
     white: f64,
-) -> Vec<Vec3> {
+) -> Result<Vec<Vec3>, PassError> {
+    // The host has read the light to find white.
     gpu.wait();
-    let viewport = eye.viewport();
-    let mut drawn = gpu.shade_pixels("tone", viewport, |lanes, at @ [x, y]| {
+    let (viewport, uses) = (eye.viewport(), Uses::default().reading([buffer.region]));
+    let drawn = gpu.shade_pixels("tone", viewport, uses, |lanes, at @ [x, y]| {
         lanes.fetch(buffer.region.address() + buffer.offset(at), LIGHT_BYTES);
         let light = light[(y * viewport.width() + x) as usize];
         lanes.run(|lane| lane.scale(TINT, lane.div(light, white) as f32))
-    });
-    drawn.images.swap_remove(0)
+    })?;
+    Ok(drawn.into_image())
 }
 
 /// Draws beams that are in memory in a pass of `gpu`, after one that makes their bounding volumes, if there are
@@ -124,11 +128,12 @@ pub(super) fn draw_stored(
         vertex_bytes: input.vertex_bytes,
         projection: Some(eye.projection()),
     };
+    let uses = Uses::default().reading([input.beams]).targeting([region, marks]);
     let shader = LightShader { eye, seen: &seen, faces: &faces, light, buffer, input, marks };
     // The last tiles may reach beyond the image.
     let last = [(columns, viewport.width()), (rows, viewport.height())]
         .map(|(tiles, px)| f64::from(tiles * TILE_PX) / f64::from(px));
-    let mut pass = gpu.begin_conservative("light", Some(Placement { first: [0.0; 2], last }));
+    let mut pass = gpu.begin_conservative("light", Some(Placement { first: [0.0; 2], last }), uses)?;
     pass.draw(gpu, &draw, &shader, |_, shaded| {
         picture.tiles += 1;
         picture.tests += u64::from(shaded.tests);
@@ -137,7 +142,7 @@ pub(super) fn draw_stored(
             picture.light[place] += light;
             picture.useful += u64::from(light > 0.0);
         }
-    });
+    })?;
     Ok((picture, buffer))
 }
 
@@ -147,8 +152,10 @@ struct Input {
     vertices: MemoryRange,
     /// Bytes of a vertex.
     vertex_bytes: u32,
-    /// Where what the light of each beam needs beside the vertices of its primitives begins.
-    beams: u64,
+    /// Where the light finds what it needs of each beam beside the vertices of its primitives.
+    beams: MemoryRange,
+    /// Where that begins.
+    first: u64,
     /// Bytes of that for a beam.
     beam_bytes: u64,
 }
@@ -157,8 +164,8 @@ impl Input {
     /// The vertices of moving triangles, and the flux of each, as the light takes all else from the vertices.
     fn moving(stored: &BeamBuffer) -> Self {
         let (vertices, vertex_bytes) = (stored.words.region(), 2 * VERTEX_BYTES);
-        let beams = vertices.address() + 4 * u64::from(VERTICES_WORDS * stored.beams);
-        Self { vertices, vertex_bytes, beams, beam_bytes: 4 }
+        let first = vertices.address() + 4 * u64::from(VERTICES_WORDS * stored.beams);
+        Self { vertices, vertex_bytes, beams: vertices, first, beam_bytes: 4 }
     }
 
     /// The faces of bodies, which a pass makes from the beams.
@@ -182,10 +189,10 @@ impl Input {
                 bindings: &[beams.reads(), made.writes(), count.writes()],
                 shader: &shader,
             })?;
-            gpu.wait();
         }
-        let (vertices, beams) = (made.region(), beams.region().address());
-        Ok(Self { vertices, vertex_bytes: VERTEX_BYTES, beams, beam_bytes: 4 * u64::from(BEAM_WORDS) })
+        let (vertices, beams) = (made.region(), beams.region());
+        let beam_bytes = 4 * u64::from(BEAM_WORDS);
+        Ok(Self { vertices, vertex_bytes: VERTEX_BYTES, beams, first: beams.address(), beam_bytes })
     }
 }
 
@@ -240,7 +247,7 @@ struct Face {
 
 /// The triangles of every beam, and what they are.
 fn primitives(seen: &[Option<Seen>], method: BeamMethod, grid: &Grid) -> (Vec<Primitive>, Vec<Face>) {
-    let whole = Rasterizer::new(View::orthographic()).halving(MAX_HALVINGS);
+    let whole = Rasterizer::new(View::orthographic()).halving(MAX_HALVINGS).without_depths();
     let (mut primitives, mut faces, mut volume) = (Vec::new(), Vec::new(), BoundingVolume::new());
     let mut add = |beam: usize, ends: [[DVec3; 3]; 2], corners: Option<[DVec3; 3]>| {
         let [open, close] = ends.map(|end| end.map(|p| p.to_array()));
@@ -382,8 +389,8 @@ impl TileShader for LightShader<'_> {
         let Face { beam, corners } = &self.faces[tile.primitive];
         let seen = self.seen[*beam].as_ref()?;
         let mut shaded = Shaded { tests: 0, lit: Vec::new() };
-        let Input { beams, beam_bytes, .. } = self.input;
-        lanes.fetch(beams + *beam as u64 * beam_bytes, beam_bytes);
+        let Input { first, beam_bytes, .. } = self.input;
+        lanes.load(first + *beam as u64 * beam_bytes, beam_bytes);
         match corners {
             None => self.moving(lanes, seen, tile, &mut shaded),
             Some(corners) => self.face(marks, (lanes, seen), (corners, tile.tile), &mut shaded),

@@ -168,7 +168,7 @@ impl Draws for Collision {
             (set.len(), kept)
         };
         let kept = kept.len() as u32;
-        let Emitted { image, fragments } = passes.finish();
+        let Emitted { image, fragments } = passes.finish()?;
         let facts = Fact::all([
             (fact::objects, self.objects.len() as f64),
             (fact::objects_that_may_collide, may_collide as f64),

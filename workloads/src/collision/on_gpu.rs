@@ -3,8 +3,8 @@
 use glam::Vec3;
 use pipeline::memory::MemoryRange;
 use pipeline::{
-    ConservativeDraw, ConservativePass, Gpu, Lane, Lanes, Placement, Primitive, TileIntervals, TileShader,
-    Viewport,
+    ConservativeDraw, ConservativePass, Gpu, Lane, Lanes, PassError, Placement, Primitive, TileIntervals,
+    TileShader, Uses, Viewport,
 };
 
 use super::object::Object;
@@ -73,6 +73,8 @@ pub(super) struct PassesOnGpu<'a, 'e> {
     answered: u64,
     method: CollisionMethod,
     fragments: u64,
+    /// Why the GPU refused a pass; nothing is drawn after that.
+    refused: Option<PassError>,
 }
 
 /// Image and number of fragments of the passes.
@@ -94,7 +96,7 @@ impl<'a, 'e> PassesOnGpu<'a, 'e> {
         let boxes = [(); 2].map(|()| gpu.allocate(layout.bytes()));
         let picture = Picture::new(objects, viewport.width() as usize);
         let answers = gpu.allocate(objects.len() as u64 * ANSWER_BYTES);
-        let (pass, answered, fragments) = Default::default();
+        let (pass, answered, fragments, refused) = Default::default();
         Self {
             gpu,
             pass,
@@ -108,6 +110,7 @@ impl<'a, 'e> PassesOnGpu<'a, 'e> {
             answered,
             method,
             fragments,
+            refused,
         }
     }
 
@@ -131,19 +134,40 @@ impl<'a, 'e> PassesOnGpu<'a, 'e> {
     }
 
     /// Writes the image and returns the totals.
-    pub fn finish(mut self) -> Emitted {
-        self.end_pass();
+    ///
+    /// # Errors
+    /// [`PassError`] if the GPU refused a pass.
+    pub fn finish(self) -> Result<Emitted, PassError> {
         let (image, side) = (self.picture.image(), self.viewport.width());
+        let passes = self.drawn()?;
         if let Some(all) = Viewport::new(3 * side, side) {
-            self.gpu.write_image("image", all);
+            passes.gpu.write_image("image", all)?;
         }
-        Emitted { image, fragments: self.fragments }
+        Ok(Emitted { image, fragments: passes.fragments })
     }
 
     /// The number of fragments, without an image.
-    pub fn into_fragments(mut self) -> u64 {
+    ///
+    /// # Errors
+    /// As [`Self::finish`].
+    pub fn into_fragments(self) -> Result<u64, PassError> {
+        Ok(self.drawn()?.fragments)
+    }
+
+    /// These passes after the last of them, if the GPU refused none.
+    fn drawn(mut self) -> Result<Self, PassError> {
         self.end_pass();
-        self.fragments
+        match self.refused.take() {
+            Some(error) => Err(error),
+            None => Ok(self),
+        }
+    }
+
+    /// Notes why the GPU refused a pass. Returns whether it did not.
+    fn is_drawn(&mut self, result: Result<(), PassError>) -> bool {
+        let is_drawn = result.is_ok();
+        self.refused = self.refused.take().or(result.err());
+        is_drawn
     }
 
     /// Where the boxes of a part are. The second part only reads those of the first unless boxes are compared.
@@ -204,7 +228,10 @@ impl PassBackend for PassesOnGpu<'_, '_> {
         if follows {
             self.gpu.wait();
         }
-        self.pass = self.gpu.begin_conservative(name, Some(self.picture.placement(pass)));
+        let uses = Uses::default().targeting(self.boxes).targeting([self.answers]);
+        let begun = self.gpu.begin_conservative(name, Some(self.picture.placement(pass)), uses);
+        let begun = begun.map(|pass| self.pass = pass);
+        self.is_drawn(begun);
     }
 
     fn draw(
@@ -218,6 +245,9 @@ impl PassBackend for PassesOnGpu<'_, '_> {
     ) -> bool {
         // There is a part, so there are objects.
         let Some(vertices) = self.vertices_of(part.object) else { return false };
+        if self.refused.is_some() {
+            return false;
+        }
         let binned = pass.primitives(part, bins);
         let primitives: Vec<Primitive> = binned.iter().map(|binned| binned.primitive.clone()).collect();
         let draw = ConservativeDraw {
@@ -239,12 +269,12 @@ impl PassBackend for PassesOnGpu<'_, '_> {
             answer,
         };
         let (picture, fragments) = (&mut self.picture, &mut self.fragments);
-        self.pass.draw(self.gpu, &draw, &shader, |tile, fragment| {
+        let drawn = self.pass.draw(self.gpu, &draw, &shader, |tile, fragment| {
             *fragments += 1;
             picture.fragment(pass, tile);
             each(&fragment);
         });
-        true
+        self.is_drawn(drawn)
     }
 
     fn compare(&mut self, pass: &Pass, bins: usize, [first, second]: [&TzBuffer; 2], merges: bool) {
@@ -252,7 +282,7 @@ impl PassBackend for PassesOnGpu<'_, '_> {
         let Some(viewport) = Viewport::new(columns, rows) else { return };
         let (targets, layout) = (self.boxes, self.layout);
         let (answers, answer, method) = (self.answers, self.next_answer(), self.method);
-        self.gpu.run_pixels(viewport, |lanes, tile| {
+        let compared = self.gpu.run_pixels(viewport, |lanes, tile| {
             for bin in 0..bins {
                 let place = pass.place(tile, bin);
                 let offset = layout.offset(tile, bin);
@@ -270,6 +300,7 @@ impl PassBackend for PassesOnGpu<'_, '_> {
                 }
             }
         });
+        self.is_drawn(compared.map(|_: Vec<()>| ()));
     }
 
     fn overlap(&mut self, pass: &Pass, tile: [u32; 2]) {
@@ -391,7 +422,7 @@ mod tests {
                 super::super::Sweeps { method, resolution: 16, bins: 1 }.detect_on(&objects, &mut passes);
             assert!(!set.is_empty());
             let marks: u32 = passes.picture.pixels.iter().map(|pixel| pixel[1]).sum();
-            let Emitted { fragments, .. } = passes.finish();
+            let Emitted { fragments, .. } = passes.finish().unwrap();
             let counts = gpu.finish().counts();
             // A box is eight words, an answer one; by depth alone, one direction is enough for a mark.
             let words = counts[Event::DepthWrites] % 8;

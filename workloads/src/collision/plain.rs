@@ -145,7 +145,7 @@ impl PlainPasses {
         let mut gpu = Gpu::without_packets(hardware)?;
         let mut passes = PassesOnGpu::new((method, viewport, 1), pair, &mut gpu);
         let overlaps = self.overlaps(pair.each_ref(), &[method], &mut passes)[0];
-        let fragments = passes.into_fragments();
+        let fragments = passes.into_fragments()?;
         let report = gpu.finish();
         let (passes, draws) = (report.passes.len() as u64, report.counts()[Event::Draws]);
         Ok((overlaps, PassWork { passes, draws, triangles: report.triangles() as u64, fragments }))

@@ -16,7 +16,9 @@ use std::ops::Range;
 use pipeline::conservative::{Grid, MovingTriangle, Rasterizer, Region, View};
 use pipeline::memory::MemoryRange;
 use pipeline::random::mix;
-use pipeline::{ConservativeDraw, Gpu, Lane, Lanes, Placement, Primitive, TileIntervals, TileShader};
+use pipeline::{
+    ConservativeDraw, Gpu, Lane, Lanes, PassError, Placement, Primitive, TileIntervals, TileShader, Uses,
+};
 
 /// Axes: x, y, time, and both of the lens, each 0 to 1. Of the lens, -1 to 1, one half is used.
 pub(super) const AXES: usize = 5;
@@ -234,7 +236,8 @@ fn cells_within([x, y]: [u32; 2], [t, u, v]: &[Range<u32>; 3]) -> impl Iterator<
 fn primitives(cells: &[Cell], grid: &Grid) -> Vec<Primitive> {
     let of = |(body, cell): (u32, &Cell)| {
         let [t, u, v] = [2, 3, 4].map(|axis| [cell.low[axis], cell.high[axis]]);
-        let rasterizer = Rasterizer::new(View::orthographic()).clipped(Region { u, v, t }).halving(0);
+        let rasterizer =
+            Rasterizer::new(View::orthographic()).clipped(Region { u, v, t }).halving(0).without_depths();
         let ([left, bottom, ..], [right, top, ..]) = (cell.low, cell.high);
         let corner = |x: f64, y: f64| [x, y, 1.0];
         let halves = [
@@ -264,13 +267,16 @@ fn primitives(cells: &[Cell], grid: &Grid) -> Vec<Primitive> {
 }
 
 /// Draws boxes, which have to be disjoint, in a pass of `gpu`, and returns the candidates in them and in the domain.
+///
+/// # Errors
+/// [`PassError`] if the GPU refuses the pass.
 pub(super) fn draw(
     gpu: &mut Gpu<'_>,
     name: &str,
     cells: &[Cell],
     lattice: &Lattice,
     within: &dyn Within,
-) -> Kept {
+) -> Result<Kept, PassError> {
     let [columns, rows, ..] = lattice.across;
     let tile = [columns, rows].map(|count| 1.0 / f64::from(count));
     let grid = Grid { origin: [0.0; 2], tile, columns, rows };
@@ -293,16 +299,16 @@ pub(super) fn draw(
     let (mut all, mut ordered) = (Kept::default(), Vec::new());
     // The image shows the whole of x and y, the larger y above.
     let placement = Placement { first: [0.0, 1.0], last: [1.0, 0.0] };
-    let mut pass = gpu.begin_conservative(name, Some(placement));
+    let mut pass = gpu.begin_conservative(name, Some(placement), Uses::default().targeting([results]))?;
     pass.draw(gpu, &draw, &shader, |_, tried| {
         all.fragments += 1;
         all.candidates += u64::from(tried.candidates);
         all.crowded += tried.crowded;
         ordered.extend(tried.kept);
-    });
+    })?;
     gpu.keep(results);
     all.points = in_order(ordered);
-    all
+    Ok(all)
 }
 
 /// The same points without a rasterizer: the candidates of all cells, each compared with all boxes.

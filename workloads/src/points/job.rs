@@ -262,7 +262,7 @@ fn round<const D: usize>(
         // The host has read the candidates of the round before.
         gpu.wait();
     }
-    Ok(draw(gpu, &format!("round {number}"), &cells, &lattice, &Everywhere))
+    Ok(draw(gpu, &format!("round {number}"), &cells, &lattice, &Everywhere)?)
 }
 
 /// The points as white squares on black.

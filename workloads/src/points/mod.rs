@@ -215,7 +215,7 @@ pub fn draw_noise<const D: usize>(
 ) -> Result<DrawnNoise<D>, WhiteError> {
     let lifted = Lifted::new(density, spec)?;
     let Kept { points, candidates, fragments, .. } =
-        draw(gpu, "columns", &lifted.cells, &lifted.lattice, &lifted);
+        draw(gpu, "columns", &lifted.cells, &lifted.lattice, &lifted)?;
     let columns = lifted.cells.len();
     Ok(DrawnNoise { points: Lifted::<D>::projected(&points), candidates, fragments, columns })
 }

@@ -65,6 +65,9 @@ pub enum WhiteError {
     /// Too many columns.
     #[error("{0} columns along an axis: they have to be 1 to 4096, and all together at most 16777216")]
     Columns(u32),
+    /// The GPU refuses the pass.
+    #[error(transparent)]
+    Pass(#[from] pipeline::PassError),
 }
 
 /// Candidates per parallel task.

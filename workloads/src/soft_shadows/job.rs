@@ -191,7 +191,7 @@ impl DrawsScene for SoftShadows {
         let visible = VisibleTriangles::draw(&view, viewport, &self.set, self.method(), gpu)?;
         let world = World::new(&view, viewport, &self.light, &albedos, self.scene.background());
         let shadows = Shadows::Map { map: &map, bias: self.options.bias };
-        let shaded = look_ups(&world, &self.set, &visible, shadows, gpu);
+        let shaded = look_ups(&world, &self.set, &visible, shadows, gpu)?;
         let facts = self.facts(&map, shaded.counts[Event::TextureFetches]);
         let mut warnings = self.regime_warnings();
         warnings.extend(self.simplified(frame));

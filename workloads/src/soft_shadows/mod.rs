@@ -162,6 +162,8 @@ pub struct ShadowMap {
     /// Event counts.
     pub counts: Counts,
     surfaces: Vec<MemoryRange>,
+    /// Side of a tile of the GPU that drew it: its depths lie tile by tile.
+    tile_px: u32,
 }
 
 impl ShadowMap {
@@ -186,7 +188,14 @@ impl ShadowMap {
         let set = set.centred();
         let seen = depth_pass(&SceneView { camera: light.camera(), draws }, viewport, &set, method, gpu)?;
         let depths = seen.samples.into_iter().map(|(_, depth)| f32::from_bits(depth)).collect();
-        Ok(Self { side, set, depths, counts: seen.counts, surfaces: seen.surfaces })
+        Ok(Self {
+            side,
+            set,
+            depths,
+            counts: seen.counts,
+            surfaces: seen.surfaces,
+            tile_px: gpu.spec().tile_px,
+        })
     }
 
     /// Texels across and down.
@@ -216,11 +225,21 @@ impl ShadowMap {
     /// Address of the depth at a [place](Self::place).
     pub fn address(&self, place: usize) -> u64 {
         let count = self.set.samples().len();
+        let (texel, index) = (place / count, place % count);
+        let [x, y] = [texel as u32 % self.side, texel as u32 / self.side];
+        let (tile_px, side) = (self.tile_px, self.side.div_ceil(self.tile_px));
+        let tile = u64::from(y / tile_px * side + x / tile_px);
+        let texel = tile * u64::from(tile_px.pow(2)) + u64::from(y % tile_px * tile_px + x % tile_px);
         let (surface, at) = match &self.surfaces[..] {
-            [all] => (all, place),
-            each => (&each[place % count], place / count),
+            [all] => (all, texel * count as u64 + index as u64),
+            each => (&each[index], texel),
         };
-        surface.address() + at as u64 * DEPTH_BYTES
+        surface.address() + at * DEPTH_BYTES
+    }
+
+    /// Where the depths are in memory.
+    pub fn surfaces(&self) -> &[MemoryRange] {
+        &self.surfaces
     }
 
     /// Whether a point is lit for sample `index` of the set: no stored depth is nearer by more than `bias`

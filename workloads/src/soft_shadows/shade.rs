@@ -11,8 +11,8 @@ use pipeline::sample_test::weights_on;
 use pipeline::sampling::{Sample, SampleSource};
 use pipeline::setup::Corner;
 use pipeline::{
-    Attachment, Attachments, Camera, Clear, Draw, Format, Gpu, Lane, Lanes, RasterPass, Rendered, Settings,
-    Shader, ShadingPoint, SurfaceId, SurfaceSpec, SurfaceView, Target, Viewport,
+    Attachment, Attachments, Camera, Clear, Draw, Format, Gpu, Lane, Lanes, PassError, RasterPass, Rendered,
+    Settings, Shader, ShadingPoint, SurfaceId, SurfaceSpec, SurfaceView, Target, Uses, Viewport,
 };
 use rayon::prelude::*;
 
@@ -153,8 +153,8 @@ impl<'a> World<'a> {
     fn fetch(&self, lanes: &Lanes, triangle: u32, albedos: MemoryRange) {
         let Some(face) = self.rays.faces().get(triangle as usize) else { return };
         let data = self.draws[face.draw].data_of(triangle - self.first[face.draw]);
-        data.iter().flatten().for_each(|&(address, bytes)| lanes.fetch(address, bytes));
-        lanes.fetch(albedos.address() + face.draw as u64 * ALBEDO_BYTES, ALBEDO_BYTES);
+        data.iter().flatten().for_each(|&(address, bytes)| lanes.load(address, bytes));
+        lanes.load(albedos.address() + face.draw as u64 * ALBEDO_BYTES, ALBEDO_BYTES);
     }
 
     /// For each sample, whether its point is lit; `None` if it sees no surface that faces the light.
@@ -273,16 +273,24 @@ struct Work<'w> {
 
 /// Shades the visible samples in a pass of its own. A program fetches the number of the triangle of its
 /// sample, then the triangle; where its draw is not resident, only what it reflects.
+///
+/// # Errors
+/// [`PassError`] if the GPU refuses the pass.
 pub fn look_ups(
     world: &World<'_>,
     samples: &dyn SampleSource,
     seen: &VisibleTriangles,
     shadows: Shadows<'_>,
     gpu: &mut Gpu<'_>,
-) -> Rendered {
-    gpu.wait();
+) -> Result<Rendered, PassError> {
     let albedos = gpu.allocate(world.albedos.len() as u64 * ALBEDO_BYTES);
-    gpu.shade_pixels("look-ups", world.viewport, |lanes, pixel| {
+    let map = if let Shadows::Map { map, .. } = shadows { map.surfaces() } else { &[] };
+    let uses = Uses::default()
+        .reading([albedos])
+        .reading(map.iter().copied())
+        .reading(seen.surfaces.iter().map(|numbers| numbers.view.region()))
+        .reading(world.draws.iter().filter_map(Draw::ranges).flatten());
+    gpu.shade_pixels("look-ups", world.viewport, uses, |lanes, pixel| {
         let work = Work { lanes, rays: &Cell::default() };
         let triangle = |index| {
             let triangle = seen.fetch(lanes, pixel, index);

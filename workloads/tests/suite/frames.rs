@@ -214,7 +214,8 @@ fn a_stopped_search_ends() {
             packets += 1;
             stop.set(packets >= most);
         };
-        job.frame(0, &mut Gpu::new(&spec, count).unwrap().stopping(&stop)).unwrap();
+        let drawn = job.frame(0, &mut Gpu::new(&spec, count).unwrap().stopping(&stop));
+        assert_eq!(drawn.is_err(), stop.get(), "a later pass is refused");
         packets
     };
     let all = packets(u32::MAX);

@@ -93,7 +93,7 @@ fn lanes_project_the_vertices_of_their_triangle() {
         let mut gpu = Gpu::without_packets(&spec).unwrap();
         let seen = VisibleTriangles::draw(&view, viewport, &set, ShadowMethod::OnePass, &mut gpu).unwrap();
         let world = World::new(&view, viewport, &light, &[Vec3::ONE], Vec3::ZERO);
-        look_ups(&world, &set, &seen, Shadows::None, &mut gpu).counts[Event::ShaderOps]
+        look_ups(&world, &set, &seen, Shadows::None, &mut gpu).unwrap().counts[Event::ShaderOps]
     };
     let of_a_vertex = u64::from(Projection::new(&camera, viewport).vertex_ops());
     assert_eq!(ops(&raised) - ops(&floor), 8 * 8 * 4 * 3 * (of_a_vertex + 12));
@@ -295,7 +295,8 @@ fn depth_passes_write_depths_only() {
 }
 
 /// The shading pass sees what the pass before it left in memory: every sample fetches its number, and where a
-/// triangle is seen its indices, its corners, what it reflects and, in the light's map, a depth. The image is
+/// triangle is seen it loads the words of its indices, its corners and what it reflects, and fetches a depth in the
+/// light's map. The image is
 /// that of the host, bit for bit.
 #[test]
 fn shading_fetches_what_it_reads() {
@@ -314,7 +315,7 @@ fn shading_fetches_what_it_reads() {
         let seen = VisibleTriangles::draw(&view, viewport, &set, method, &mut gpu).unwrap();
         let world = World::new(&view, viewport, &light, &albedos, Vec3::splat(0.5));
         let shadows = Shadows::Map { map: &map, bias: 0.06 };
-        let shaded = look_ups(&world, &set, &seen, shadows, &mut gpu);
+        let shaded = look_ups(&world, &set, &seen, shadows, &mut gpu).unwrap();
         let by_host =
             depth_pass(&view, viewport, &set, method, &mut Gpu::without_packets(&spec).unwrap()).unwrap();
         let host = by_host.samples.iter().map(|(triangle, _)| *triangle);
@@ -330,7 +331,15 @@ fn shading_fetches_what_it_reads() {
         let lit = world.lit_and_unlit(&set, &by_host.samples, Shadows::None);
         let facing = lit.iter().flatten().count() as u64;
         assert!(0 < facing && facing < on_surfaces && on_surfaces < samples);
-        let but_depths = samples + 5 * on_surfaces;
+        let triangles = draws
+            .iter()
+            .flat_map(|draw| (0..draw.geometry.triangles().len()).map(|at| draw.data_of(at as u32).unwrap()));
+        // Words of the data of each triangle, and three of what it reflects.
+        let words = triangles.map(|data| data.iter().map(|(_, bytes)| bytes / 4).sum::<u64>() + 3);
+        let words: Vec<u64> = words.collect();
+        let loads =
+            by_host.samples.iter().filter_map(|(triangle, _)| words.get(*triangle as usize)).sum::<u64>();
+        let but_depths = samples + loads;
         // A point outside of the light's map fetches no depth.
         assert!((but_depths + facing / 2..=but_depths + facing).contains(&fetches), "{fetches}");
         let report = gpu.finish();

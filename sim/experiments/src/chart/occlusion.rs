@@ -384,9 +384,9 @@ impl Drawn {
         let queries = IntervalQueries::new(&pyramid, &projection);
         let mut gpu = Gpu::without_packets(&self.spec)?;
         let stored = gpu.allocate(DEPTH_BYTES * self.depths.len() as u64);
-        gpu.gather_farthest_depths("farthest depths", &pyramid, stored);
+        gpu.gather_farthest_depths("farthest depths", &pyramid, stored)?;
         let gathering = gpu.counts_of_pass();
-        let answers = gpu.query_boxes("queries", &queries, &self.scene.boxes);
+        let answers = gpu.query_boxes("queries", &queries, &self.scene.boxes)?;
         Ok(QueryAnswers {
             answers,
             half_covered: pyramid.half_covered(),
