@@ -351,26 +351,39 @@ pub(crate) struct QueryAnswers {
 }
 
 impl Drawn {
-    /// Draws the walls of a scene into an image of `size` with `samples` in a pixel, and tests every box by samples.
+    /// Draws the walls of a scene into an image of `size` with `samples` in a pixel on the reference GPU, and tests every
+    /// box by samples.
     ///
     /// # Errors
     /// When no such scene or image exists.
     pub fn new(size: [u32; 2], scene: &WallSceneSpec, samples: u32) -> Result<Self, StudyError> {
+        Self::on(GpuSpec::load("reference")?.pipeline, size, scene, samples)
+    }
+
+    /// The same on a GPU of this pipeline.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn on(
+        spec: PipelineSpec,
+        size: [u32; 2],
+        scene: &WallSceneSpec,
+        samples: u32,
+    ) -> Result<Self, StudyError> {
         let scene = scene.wall_scene().ok_or_else(|| StudyError::Pipeline("a wall scene".to_owned()))?;
-        let gpu = GpuSpec::load("reference")?;
         let viewport = Viewport::new(size[0], size[1])
             .ok_or_else(|| StudyError::Pipeline("an image without area".to_owned()))?;
         let table = SampleTable::low_discrepancy(samples, SEED, LensShape::Disk)?;
-        let settings = Settings { spec: &gpu.pipeline, viewport, samples: &table, background: Vec3::ZERO };
+        let settings = Settings { spec: &spec, viewport, samples: &table, background: Vec3::ZERO };
         let walls = [scene.walls(&Unshaded).map_err(|error| StudyError::Pipeline(error.to_string()))?];
         let occluders = RasterPass::new(&scene.camera, &walls, &settings);
-        let mut alone = Gpu::without_packets(&gpu.pipeline)?;
+        let mut alone = Gpu::without_packets(&spec)?;
         let depths = depths_of(&alone.draw(&occluders.onto(Target::Depth).with_visible())?.visible);
         let query = |any: bool| SampledQueries { occluders, any }.query(&scene.boxes);
         let (seen, counted) = (query(true)?, query(false)?);
         let ran = [&alone.finish(), &seen.report, &counted.report].map(Ran::of).into_iter().sum();
         let [seen, counted] = [seen, counted].map(|queried| queried.answers);
-        Ok(Self { scene, viewport, table, spec: gpu.pipeline, depths, seen, counted, ran })
+        Ok(Self { scene, viewport, table, spec, depths, seen, counted, ran })
     }
 
     /// By intervals, with so many boxes of lens and time and tiles of this side.

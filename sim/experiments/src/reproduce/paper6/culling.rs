@@ -14,12 +14,13 @@ use workloads::occlusion::WallSceneSpec;
 use workloads::stress::{Size, StressScene, brute_force};
 use workloads::visibility::Unshaded;
 
-use super::settings::{Bound, Hardware, QueriedObjects};
+use super::settings::{Bound, Cost, Hardware, QueriedObjects};
 use super::{Task, catalogue};
 use crate::chart::occlusion::{Drawn, OcclusionBlur, QueryAnswers};
 use crate::reproduce::Done;
 use crate::reproduce::report::{Figure, over_doublings};
 use crate::reproduce::row::{Cases, ClaimRow, NamedValue, Verdict, numbers, one_at_a_time, ran, short};
+use crate::reproduce::settings::Form;
 use crate::study::Ran;
 
 /// Draws the scenes of a kind, with `queries` queried boxes in each.
@@ -220,43 +221,65 @@ fn least(all: &[Costs]) -> [f64; 3] {
     [0, 1, 2].map(|of| all.iter().map(|costs| costs.ratio(of)).fold(f64::INFINITY, f64::min))
 }
 
+/// Scenes with both kinds of answers, for each kind of blur and number of samples.
+type Queried = Vec<Vec<(Drawn, QueryAnswers)>>;
+
+/// Queries all scenes of VI-5, by samples on a machine with tiles of `rival_px`.
+fn queried(row: &Cost, form: Form, rival_px: u32) -> Result<Queried, RunError> {
+    let machine = PipelineSpec { tile_px: rival_px, ..GpuSpec::load("reference")?.pipeline };
+    let (size, asked, tile_px) = (*row.size_px.get(form), *row.asked.get(form), *row.tile_px.get(form));
+    let mut all = Vec::new();
+    for kind in OcclusionBlur::ALL {
+        for &samples in row.samples.get(form) {
+            let answered = |yard| {
+                let scene = Drawn::on(machine, [size.0, size.1], &kind.spec(asked, yard), samples)?;
+                let answered = scene.query(kind.typical(), tile_px)?;
+                Ok((scene, answered))
+            };
+            all.push((0..*row.yards.get(form)).map(answered).collect::<Result<Vec<_>, RunError>>()?);
+        }
+    }
+    Ok(all)
+}
+
+/// Costs by kind of blur and number of samples, as in [`Costs::of`].
+fn costs(queried: &[Vec<(Drawn, QueryAnswers)>], objects: QueriedObjects, charged: f64) -> Vec<Costs> {
+    queried.iter().map(|scenes| Costs::of(scenes, objects, charged)).collect()
+}
+
 /// VI-5: what a query costs.
 pub(super) fn cost(task: &Task<'_>) -> Result<Done, RunError> {
     let with = task.with(|settings| &settings.vi_5);
     let (row, form) = (with.settings, with.form);
-    let (size, queries, tile_px) = (*row.size_px.get(form), *row.asked.get(form), *row.tile_px.get(form));
-    let mut queried = Vec::new();
-    for kind in OcclusionBlur::ALL {
-        for &samples in row.samples.get(form) {
-            let scenes = drawn(kind, *row.yards.get(form), |spec| spec, size, samples, queries)?;
-            let answered = |scene: Drawn| {
-                let answered = scene.query(kind.typical(), tile_px)?;
-                Ok((scene, answered))
-            };
-            queried.push(scenes.into_iter().map(answered).collect::<Result<Vec<_>, RunError>>()?);
-        }
-    }
-    let costs = |objects, charged| {
-        queried.iter().map(|scenes| Costs::of(scenes, objects, charged)).collect::<Vec<_>>()
-    };
     let far = *row.far_fewer.get(form);
-    let mut tried =
-        Cases::new("times fewer tests or bytes, whichever are nearer", "objects and boxes_charged jointly");
-    for &objects in row.objects.all(form) {
-        let at = row.boxes_charged.all(form).iter().map(|&charged| {
-            let [tests, bytes, _] = least(&costs(objects, charged));
-            (charged, tests.min(bytes), tests > far && bytes > far)
-        });
-        let which = if objects == QueriedObjects::All { "all objects" } else { "hidden objects" };
-        tried.along(&format!("boxes_charged ({which})"), at.collect::<Vec<_>>());
+    let mut tried = Cases::new(
+        "times fewer tests or bytes, whichever are nearer",
+        "objects, boxes_charged and rival_tile_px jointly",
+    );
+    let mut machines = Vec::new();
+    for &side in row.rival_tile_px.all(form) {
+        let queried = queried(row, form, side)?;
+        for &objects in row.objects.all(form) {
+            let at = row.boxes_charged.all(form).iter().map(|&charged| {
+                let [tests, bytes, _] = least(&costs(&queried, objects, charged));
+                (charged, tests.min(bytes), tests > far && bytes > far)
+            });
+            let which = if objects == QueriedObjects::All { "all" } else { "hidden" };
+            let of = format!("boxes_charged ({which} objects, {side}-pixel tiles of the rival)");
+            tried.along(&of, at.collect::<Vec<_>>());
+        }
+        machines.push((side, queried));
     }
-    let full = row.objects.values() * row.boxes_charged.values();
+    let full = row.objects.values() * row.boxes_charged.values() * row.rival_tile_px.values();
     let band = tried.band(full)?;
-    let base = costs(*row.objects.get(form), *row.boxes_charged.get(form));
+    let rival_px = *row.rival_tile_px.get(form);
+    let given = machines.iter().find(|(side, _)| *side == rival_px);
+    let queried = given.map_or(&[][..], |(_, queried)| queried);
+    let base = costs(queried, *row.objects.get(form), *row.boxes_charged.get(form));
     let [tests, bytes, madds] = least(&base);
-    let charged = least(&costs(*row.objects.get(form), 1.0));
+    let charged = least(&costs(queried, *row.objects.get(form), 1.0));
     let ours = format!(
-        "at least {} times fewer tests, {} times fewer bytes, {} times fewer multiply-adds than sampled queries with Hi-Z that end at the first sample; \
+        "at least {} times fewer tests, {} times fewer bytes, {} times fewer multiply-adds than sampled queries with Hi-Z of {rival_px}-pixel tiles that end at the first sample; \
          with the farthest depths gathered for the queries, which is compares alone, {} times fewer tests and {} times fewer bytes",
         short(tests),
         short(bytes),

@@ -76,6 +76,7 @@ row_settings! {
         boxes_charged: f64, within(0.0..=1.0);
         far_fewer: f64, within(1.0..=1e6);
         tile_px: u32, must(tile, TILE);
+        rival_tile_px: u32, must(|side: &u32| [1, 2, 4, 8].contains(side), "1, 2, 4 or 8");
         yards: u64, within(1..=100);
         asked: u32, within(1..=10_000);
         size_px: Size, must(image, IMAGE);
