@@ -150,9 +150,15 @@ fn heat_maps_of_passes_add_up_to_that_of_the_frame() {
         sum_j += pass_j;
     }
     assert!((sum_j / placed("joules") - 1.0).abs() < 1e-9, "{sum_j}");
-    let ended = quintile().call(["run", "tiny", "--heat", "joules@sceen"]);
-    assert_eq!(ended.code, Some(2), "{}", ended.stderr);
-    assert!(ended.stderr.contains("a frame has no such pass; it has scene"), "{}", ended.stderr);
+    for more in [&[][..], &["--dry-run"], &["--frames", "3..4"]] {
+        let ended = quintile().call([&["run", "tiny", "--heat", "joules@sceen"], more].concat());
+        assert_eq!(ended.code, Some(2), "{}", ended.stderr);
+        let frame = if more.contains(&"3..4") { 3 } else { 0 };
+        let expected = format!("frame {frame} has no such pass; it has scene");
+        assert!(ended.stderr.contains(&expected), "{}", ended.stderr);
+    }
+    let ended = quintile().call(["run", "tiny", "--heat", "joules@"]);
+    assert!(ended.code == Some(2) && ended.stderr.contains("name a pass after the @"), "{}", ended.stderr);
     let ended = quintile().call(["run", "tiny", "--heat", "joules@a b", "--heat", "joules@a-b"]);
     assert!(ended.code == Some(2) && ended.stderr.contains("are both written to"), "{}", ended.stderr);
 }

@@ -50,8 +50,7 @@ impl Gpu<'_> {
         let spec = pass.check(self.spec().compute.as_ref()).map_err(failed)?;
         self.check_frame(pass.name)?;
         self.check_buffers(pass.name, pass.bindings)?;
-        let (name, draws, others) = (pass.name.to_owned(), vec![Counts::default()], Counts::default());
-        self.start(PassReport { name, triangles: 0, draws, others });
+        self.start(PassReport { draws: vec![Counts::default()], ..PassReport::named(pass.name, 0) });
         if pass.bindings.iter().any(|binding| self.conflicts(binding.region, binding.access == Access::Write))
         {
             self.barrier(Waits::Tiles);

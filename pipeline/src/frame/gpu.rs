@@ -102,6 +102,8 @@ pub struct PassReport {
     pub triangles: usize,
     /// Events of each draw; those of a dispatch of groups are one.
     pub draws: Vec<Counts>,
+    /// Number of draws whose events are among the others, as [`Self::forget_draws`] was called.
+    pub forgotten_draws: usize,
     /// Events of no single draw: resolving, and the barrier before the pass.
     pub others: Counts,
 }
@@ -109,7 +111,13 @@ pub struct PassReport {
 impl PassReport {
     fn new(pass: &RasterPass<'_>) -> Self {
         let draws = vec![Counts::default(); pass.draws.len()];
-        Self { name: pass.name.to_owned(), triangles: pass.triangles(), draws, others: Counts::default() }
+        Self { draws, ..Self::named(pass.name, pass.triangles()) }
+    }
+
+    /// A pass without draws so far.
+    pub fn named(name: &str, triangles: usize) -> Self {
+        let (name, others) = (name.to_owned(), Counts::default());
+        Self { name, triangles, draws: Vec::new(), forgotten_draws: 0, others }
     }
 
     fn add(&mut self, packet: &Packet) {
@@ -119,6 +127,7 @@ impl PassReport {
     /// Keeps the events, but not of which draw they are.
     pub fn forget_draws(&mut self) {
         self.others = self.counts();
+        self.forgotten_draws += self.draws.len();
         self.draws.clear();
     }
 
@@ -266,8 +275,7 @@ impl<'e> Gpu<'e> {
     /// Starts a pass whose packets are made outside of rasterization. Their tiles are those of an image of
     /// the size of `viewport`, if any.
     pub(super) fn open(&mut self, name: &str, viewport: Option<Viewport>) {
-        let (name, draws, others) = (name.to_owned(), Vec::new(), Counts::default());
-        self.start(PassReport { name, triangles: 0, draws, others });
+        self.start(PassReport::named(name, 0));
         self.is_on_map = viewport.is_some_and(|viewport| self.heat.is_of(viewport));
     }
 

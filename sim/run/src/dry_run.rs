@@ -1,5 +1,7 @@
 //! `--dry-run`: what a run would do, and the time and memory that it is expected to take.
 
+use std::cell::Cell;
+
 use cpu_time::ProcessTime;
 use output::table::{counted, digits, grouped, si};
 use pipeline::Gpu;
@@ -11,7 +13,7 @@ use workloads::Scene;
 use workloads::job::Reduction;
 
 use crate::plan::BYTES_PER_SAMPLE;
-use crate::{Choice, Distinct, Plan, Prepared, RunError, Sampling, area_mm2, frame};
+use crate::{Choice, Distinct, Plan, Prepared, RunError, Sampling, area_mm2, frame, heat};
 
 /// Description of a run before it starts.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -175,6 +177,8 @@ impl DryTimed {
 pub struct Expected {
     /// Wall-clock seconds to the last file; accurate to a factor of two on an otherwise idle host.
     pub host_s: f64,
+    /// Whether it takes that at least: a frame of a workload was not drawn to its end to find out.
+    pub at_least: bool,
     /// Memory in bytes; `None` for a workload, whose passes keep surfaces of their own.
     pub memory_bytes: Option<u64>,
 }
@@ -193,6 +197,10 @@ const TRACE_SAMPLE_BYTES: f64 = 70.0;
 const PREVIEW_TIME_RATIO: f64 = 0.05;
 /// Least number of differing frames of a workload from which on the estimate is worth its cost.
 pub(super) const MIN_WORKLOAD_FRAMES: usize = 4;
+/// Processor time after which a frame is not drawn further to find out how long it takes, in seconds.
+const MAX_PROBE_S: f64 = 10.0;
+/// Packets from one look at the time to the next.
+const PACKETS_PER_LOOK: u32 = 1024;
 /// Memory of the program with a small scene, in bytes.
 const PROGRAM_BYTES: u64 = 30_000_000;
 /// Memory of one triangle of the scene in bytes.
@@ -217,10 +225,15 @@ impl Expected {
             Sampling::Every => (differ, 0.0),
             sampling => (sampling.first(all).min(differ), PREVIEW_TIME_RATIO * differ as f64),
         };
-        let probe = Probe { plan, number: distinct.numbers()[differ / 2] };
-        let mut frames_s = probe.frame_s(plan.options.level())? * (whole as f64 + previews);
+        let has_heat_of_passes = plan.options.heat.iter().any(|request| request.pass.is_some());
+        let number = distinct.numbers()[if has_heat_of_passes { 0 } else { differ / 2 }];
+        let probe = Probe { plan, number };
+        let (frame_s, mut at_least) = probe.frame_s(plan.options.level())?;
+        let mut frames_s = frame_s * (whole as f64 + previews);
         if plan.options.verify {
-            frames_s += probe.frame_s(Level::Stepped)? * differ as f64;
+            let (stepped_s, is_least) = probe.frame_s(Level::Stepped)?;
+            frames_s += stepped_s * differ as f64;
+            at_least |= is_least;
         }
         let threads = rayon::current_num_threads();
         let trace_samples = plan.size().trace_samples();
@@ -230,13 +243,14 @@ impl Expected {
             None => (threads.min(differ), None),
         };
         let host_s = FILES_S + TRACE_SAMPLE_S * trace_samples + frames_s / workers as f64;
-        Ok(Self { host_s, memory_bytes })
+        Ok(Self { host_s, at_least, memory_bytes })
     }
 
     /// Time and memory as text.
     pub fn line(&self) -> String {
         let memory = self.memory_bytes.map(|bytes| format!(", {:.0} MB of memory", bytes as f64 / 1e6));
-        format!("about {}{}", duration(self.host_s), memory.unwrap_or_default())
+        let how = if self.at_least { "at least" } else { "about" };
+        format!("{how} {}{}", duration(self.host_s), memory.unwrap_or_default())
     }
 }
 
@@ -279,18 +293,25 @@ struct Rendered {
     made_s: f64,
     /// To draw and time it with all its triangles.
     drawn_s: f64,
+    /// Whether it was drawn to its end.
+    is_whole: bool,
 }
 
 impl Probe<'_> {
-    /// CPU seconds for a frame of the run at `level`: a line `a + b pixels` through the times of two sizes.
-    fn frame_s(&self, level: Level) -> Result<f64, RunError> {
+    /// CPU seconds for a frame of the run at `level`: a line `a + b pixels` through the times of two sizes. And whether
+    /// it takes that at least, as it was not drawn to its end.
+    fn frame_s(&self, level: Level) -> Result<(f64, bool), RunError> {
         let samples = self.plan.pixels() as f64 * f64::from(self.plan.per_pixel());
         let by = (samples / PROBE_SAMPLES).sqrt().max(1.0);
         let small = self.rendered(by, level)?;
+        if !small.is_whole {
+            return Ok((small.made_s + small.drawn_s, true));
+        }
         let large = if by > 1.0 { self.rendered((0.5 * by).max(1.0), level)? } else { small };
         let (x0, x1, y1) = (small.pixels, large.pixels, large.drawn_s);
         let b = if x1 > x0 { ((y1 - small.drawn_s) / (x1 - x0)).clamp(0.0, y1 / x1) } else { y1 / x1 };
-        Ok(small.made_s.min(large.made_s) + y1 + b * (self.plan.pixels() as f64 - x1))
+        let frame_s = small.made_s.min(large.made_s) + y1 + b * (self.plan.pixels() as f64 - x1);
+        Ok((frame_s, !large.is_whole))
     }
 
     /// The frame, rendered `by` times smaller along each axis.
@@ -305,14 +326,28 @@ impl Probe<'_> {
         let made_s = started.elapsed().as_secs_f64();
         let recorder = Recorder::new(crate::BIN_PS, frame::MIN_FRAME_BINS);
         let mut clock = CheckedClock::new(level, plan.gpu.machine()?, recorder);
-        let emit = |packet: &_, lines: &_| clock.push(packet, lines);
-        let mut gpu = Gpu::new(&plan.gpu.pipeline, emit)?;
-        ready.draw(&mut gpu).map_err(RunError::on(&plan.gpu))?;
-        let triangles = gpu.finish().triangles();
+        let (stop, mut packets) = (Cell::new(false), 0_u32);
+        let emit = |packet: &_, lines: &_| {
+            clock.push(packet, lines);
+            packets += 1;
+            let is_look = packets.is_multiple_of(PACKETS_PER_LOOK);
+            stop.set(stop.get() || is_look && started.elapsed().as_secs_f64() > made_s + MAX_PROBE_S);
+        };
+        let mut gpu = Gpu::new(&plan.gpu.pipeline, emit)?.stopping(&stop);
+        let drawn = ready.draw(&mut gpu);
+        let is_whole = !stop.get();
+        if is_whole {
+            drawn.map_err(RunError::on(&plan.gpu))?;
+        }
+        let report = gpu.finish();
+        if is_whole {
+            heat::check_passes(&plan.options.heat, number, &report)?;
+        }
+        let triangles = report.triangles();
         clock.finish()?;
         let all = plan.job.scene().filter(|_| is_rendering(plan)).map_or(triangles, Scene::triangle_count);
         let drawn_s = (started.elapsed().as_secs_f64() - made_s) * all as f64 / triangles.max(1) as f64;
-        Ok(Rendered { pixels: f64::from(size[0]) * f64::from(size[1]), made_s, drawn_s })
+        Ok(Rendered { pixels: f64::from(size[0]) * f64::from(size[1]), made_s, drawn_s, is_whole })
     }
 }
 

@@ -92,6 +92,8 @@ pub(super) struct FrameSimulator<'a> {
     pub dir: Option<&'a OutDir>,
     /// Largest number of timeline bins of a frame.
     pub max_bins: usize,
+    /// Group that has to have the passes whose heat maps are requested; those of other groups may be empty.
+    pub checked: usize,
 }
 
 /// Result of simulating one frame.
@@ -108,6 +110,9 @@ impl FrameSimulator<'_> {
         let (plan, dir, number) = (self.plan, self.dir, self.distinct.numbers()[group]);
         let simulated = caught(number, || simulate_frame(plan, number, self.max_bins));
         let (frame, Pictures { image, heat: maps }) = simulated?;
+        if let Some(observed) = frame.observed().filter(|_| group == self.checked) {
+            heat::check_passes(&plan.options.heat, number, &observed.report)?;
+        }
         let mut heat = Vec::new();
         if let Some(dir) = dir {
             heat = heat::write_all(plan, dir, number, &maps, &image)?;
@@ -146,9 +151,6 @@ pub(crate) fn draw<'a>(
 ) -> Result<(DrawnFrame, Pictures), RunError> {
     let (ready, requests) = (plan.job.prepare(number)?, &plan.options.heat);
     let (drawn, mut report) = draw_on(&plan.gpu, Some((requests, plan.viewport)), &*ready, stop, emit)?;
-    if stop.is_none_or(|stop| !stop.get()) {
-        heat::check_passes(requests, &report)?;
-    }
     let Drawn { image, moving, lens, facts, warnings } = drawn;
     let heat = std::mem::take(&mut report.heat);
     passes::limit_draws(&mut report);

@@ -56,14 +56,17 @@ fn events(quantities: impl Iterator<Item = HeatQuantity>) -> Vec<Event> {
 ///
 /// # Errors
 /// [`RunError::Setting`] with the names of its passes.
-pub(super) fn check_passes(requests: &[HeatRequest], report: &FrameReport) -> Result<(), RunError> {
+pub(super) fn check_passes(
+    requests: &[HeatRequest],
+    frame: u32,
+    report: &FrameReport,
+) -> Result<(), RunError> {
     let mut names: Vec<&str> = report.passes.iter().map(|pass| &*pass.name).collect();
     let missing = requests.iter().find(|of| of.pass.as_deref().is_some_and(|pass| !names.contains(&pass)));
     let Some(missing) = missing else { return Ok(()) };
     names.sort_unstable();
     names.dedup();
-    // No number of a frame: which of several is drawn first depends on the threads.
-    let why = format!("`{missing}`: a frame has no such pass; it has {}", names.join(", "));
+    let why = format!("`{missing}`: frame {frame} has no such pass; it has {}", names.join(", "));
     Err(RunError::invalid("heat", why))
 }
 

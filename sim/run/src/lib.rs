@@ -204,11 +204,11 @@ fn simulate(
     progress: &Progress,
 ) -> Result<Simulated, RunError> {
     let max_bins = max_bins_per_frame(distinct.numbers().len());
-    let simulator = FrameSimulator { plan, distinct, dir: Some(dir), max_bins };
+    let simulator = FrameSimulator { plan, distinct, dir: Some(dir), max_bins, checked: 0 };
     if plan.options.sampling == Sampling::Every || has_few_distinct(distinct, plan.options.sampling) {
         return every(&simulator, progress);
     }
-    sampled::simulate(&simulator, progress)
+    sampled::simulate(simulator, progress)
 }
 
 /// Whether there are so few distinct frames that prediction would save nothing.
@@ -221,7 +221,7 @@ fn has_few_distinct(distinct: &Distinct, sampling: Sampling) -> bool {
 fn without_files(plan: &Plan, progress: &Progress) -> Result<Simulated, RunError> {
     let distinct = &Distinct::new(&*plan.job)?;
     let max_bins = max_bins_per_frame(distinct.numbers().len());
-    every(&FrameSimulator { plan, distinct, dir: None, max_bins }, progress)
+    every(&FrameSimulator { plan, distinct, dir: None, max_bins, checked: 0 }, progress)
 }
 
 /// Simulates all distinct frames. Keeps the images of the first, the middle and the last.

@@ -25,6 +25,8 @@ pub struct PassSummary {
     pub all: WorkSummary,
     /// Draws of a pass, by their place in it. Empty if there is one draw only, or too many.
     pub draws: Vec<WorkSummary>,
+    /// Most draws of a pass in a frame, if they are too many to be listed; 0 otherwise.
+    pub unlisted_draws: u64,
     /// What is of no single draw; with the draws it adds up to `all`. `None` without draws.
     pub others: Option<WorkSummary>,
 }
@@ -84,7 +86,8 @@ pub fn passes_of<'a>(plan: &Plan, frames: impl Iterator<Item = &'a RunFrame>) ->
     let mut rows: Vec<_> = groups.into_iter().map(|group| group.summary(&plan.model)).collect();
     let used = write_back.counts;
     let all = write_back.summary(&plan.model, &used);
-    rows.push(PassSummary { name: WRITE_BACK.to_owned(), passes: 0, all, draws: Vec::new(), others: None });
+    let name = WRITE_BACK.to_owned();
+    rows.push(PassSummary { name, passes: 0, all, draws: Vec::new(), unlisted_draws: 0, others: None });
     rows
 }
 
@@ -168,6 +171,8 @@ struct Group<'a> {
     passes: u64,
     all: Spent<'a>,
     draws: Vec<Spent<'a>>,
+    /// Most draws of a pass that are among the others.
+    forgotten: usize,
     others: Spent<'a>,
 }
 
@@ -195,6 +200,7 @@ fn add<'a>(
         let others_w = others_w(span);
         let group = &mut groups[place];
         group.passes += 1;
+        group.forgotten = group.forgotten.max(pass.forgotten_draws);
         group.all.add_span(&pass.counts(), span, others_w, frame.stalls);
         if pass.draws.len() > 1 {
             let draws_ps = frame.times.get(number).map_or(&[][..], |time| &time.draws_ps);
@@ -226,6 +232,7 @@ impl<'a> Group<'a> {
 
     fn summary(self, model: &PowerModel) -> PassSummary {
         let is_listed = (2..=MAX_DRAWS).contains(&self.draws.len());
+        let unlisted = self.forgotten.max(if self.draws.len() > MAX_DRAWS { self.draws.len() } else { 0 });
         let draws = if is_listed { self.draws } else { Vec::new() };
         let used = self.all.counts;
         PassSummary {
@@ -233,6 +240,7 @@ impl<'a> Group<'a> {
             passes: self.passes,
             all: self.all.summary(model, &used),
             draws: draws.into_iter().map(|draw| draw.summary(model, &used)).collect(),
+            unlisted_draws: unlisted as u64,
             others: is_listed.then(|| self.others.summary(model, &used)),
         }
     }
@@ -402,7 +410,8 @@ mod tests {
     }
 
     fn pass(name: &str, draws: Vec<Counts>) -> PassReport {
-        PassReport { name: name.to_owned(), triangles: 1, draws, others: counts(Event::PixelsResolved, 3) }
+        let others = counts(Event::PixelsResolved, 3);
+        PassReport { draws, others, ..PassReport::named(name, 1) }
     }
 
     #[test]
@@ -469,5 +478,6 @@ mod tests {
         let before = report.counts();
         limit_draws(&mut report);
         assert!(report.passes[0].draws.is_empty() && report.counts() == before);
+        assert_eq!(report.passes[0].forgotten_draws, MAX_DRAWS + 1);
     }
 }

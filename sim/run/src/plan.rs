@@ -238,9 +238,13 @@ fn check_recorder(options: &RunOptions) -> Result<(), RunError> {
     Ok(())
 }
 
-/// Checks that no two heat maps are of one file.
+/// Checks that passes of heat maps have names, and that no two maps are of one file.
 fn check_heat(requests: &[HeatRequest]) -> Result<(), RunError> {
     for (at, request) in requests.iter().enumerate() {
+        if request.pass.as_deref() == Some("") {
+            let why = format!("`{request}`: name a pass after the @, or leave it out for the whole frame");
+            return Err(RunError::invalid("heat", why));
+        }
         let path = request.path(0);
         if let Some(other) = requests[..at].iter().find(|other| other.path(0) == path) {
             let why =

@@ -163,13 +163,19 @@ fn passes(outcome: &FinishedRun) -> Vec<PassRow> {
             .join(", "),
     };
     let row = |pass: &PassSummary| PassRow {
-        name: pass.name.clone(),
+        name: named(pass),
         passes: pass.passes,
         all: work(&pass.all),
         draws: if pass.draws.len() <= MAX_DRAWS { pass.draws.iter().map(work).collect() } else { Vec::new() },
         others: pass.others.as_ref().map(work),
     };
     rows.iter().map(row).collect()
+}
+
+/// Name of a pass, with the number of its draws if none is listed.
+fn named(pass: &PassSummary) -> String {
+    let unlisted = if pass.draws.len() > MAX_DRAWS { pass.draws.len() as u64 } else { pass.unlisted_draws };
+    if unlisted > 0 { format!("{} ({unlisted} draws)", pass.name) } else { pass.name.clone() }
 }
 
 fn units(outcome: &FinishedRun) -> Vec<UnitRow> {

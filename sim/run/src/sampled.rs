@@ -62,10 +62,11 @@ impl<'a> Previews<'a> {
 }
 
 /// Simulates the frames that the plan requires and predicts the others.
-pub(super) fn simulate(simulator: &FrameSimulator<'_>, progress: &Progress) -> Result<Simulated, RunError> {
+pub(super) fn simulate(simulator: FrameSimulator<'_>, progress: &Progress) -> Result<Simulated, RunError> {
     let (plan, groups) = (simulator.plan, simulator.distinct.groups());
     let previews = Previews::new(plan, simulator.distinct.numbers(), progress)?.for_frames(groups);
     let pilot = groups[previews.pilot];
+    let simulator = &FrameSimulator { checked: pilot, ..simulator };
     let mut whole = BTreeMap::from([(pilot, simulator.simulate(pilot, true)?)]);
     let signatures = Signatures::new(&previews.frames, previews.pilot, &whole[&pilot].frame, &plan.model);
     let mut count = plan.options.sampling.first(groups.len());

@@ -5,9 +5,13 @@ use cpu_time::ThreadTime;
 use output::OutputError;
 use output::plot::{ChartPanel, Scale, Series};
 use output::terminal::Progress;
+use power_model::{EnergyTable, Platform, PowerModel};
+use run::{GpuSpec, JobFrame, RunError};
 use serde::Serialize;
 use workloads::collision::families::{Case, cases, reference_cases, slide, triangles_boxes_touch};
-use workloads::collision::{CollisionMethod, PairSearch, Sweeps, candidates, detect};
+use workloads::collision::{CollisionMethod, PairSearch, Sweeps, candidates, detect, job};
+use workloads::job::{JobRequest, OptionSource};
+use workloads::scene::Overrides;
 
 use crate::study::table::{Sheet, TableBuilder, fixed, millis, plain};
 use crate::study::tradeoff::{Metric, TradeoffPoint};
@@ -30,6 +34,8 @@ pub struct CcdEffort {
     pub reference_cases: [usize; 2],
     /// Bins of time in a pixel for these.
     pub reference_bins: &'static [u32],
+    /// Balls that `quintile run ccd` moves, drawn on a GPU with and without narrowing.
+    pub balls: u32,
 }
 
 /// A method of collision detection.
@@ -122,6 +128,28 @@ pub struct Slide {
     pub kept: f64,
 }
 
+/// A frame of `quintile run ccd`.
+#[derive(Clone, Debug, Serialize)]
+pub struct Narrowing {
+    /// Whether pairs are narrowed one by one, instead of two sweeps over all objects along each axis.
+    pub narrow: bool,
+    /// Pixels across.
+    pub resolution: u32,
+    /// Pairs that may collide, as a share of those whose swept boxes touch.
+    pub kept: f64,
+    /// Time on the GPU, s.
+    pub gpu_s: f64,
+    /// Energy, J.
+    pub gpu_j: f64,
+}
+
+impl Narrowing {
+    /// Name of the method.
+    fn name(&self) -> &'static str {
+        if self.narrow { "narrowed pair by pair" } else { "two sweeps" }
+    }
+}
+
 /// Everything the chart found.
 #[derive(Clone, Debug, Serialize)]
 pub struct CcdChart {
@@ -135,6 +163,8 @@ pub struct CcdChart {
     pub rows: Vec<CcdRow>,
     /// Plates that slide, looked at closer.
     pub slides: Vec<Slide>,
+    /// Frames with and without narrowing.
+    pub narrowed: Vec<Narrowing>,
 }
 
 /// Two-object cases, then those of many.
@@ -187,7 +217,7 @@ impl Study for CcdChart {
     const NAME: &'static str = "ccd";
     const ABOUT: &'static str =
         "False positives of collision detection, over resolution, bins of time and cost, and where it fails";
-    const PICTURES: &'static [&'static str] = &["ccd", "ccd_failures"];
+    const PICTURES: &'static [&'static str] = &["ccd", "ccd_failures", "ccd_narrowing"];
     const FILES: &'static [&'static str] = &["ccd.csv", "ccd.json"];
 
     type Effort = CcdEffort;
@@ -199,6 +229,7 @@ impl Study for CcdChart {
         slides: 16,
         reference_cases: [12, 3],
         reference_bins: &[1, 16, 64],
+        balls: 12,
     };
     const QUICK: CcdEffort = CcdEffort {
         cases: [3, 1],
@@ -208,6 +239,7 @@ impl Study for CcdChart {
         slides: 6,
         reference_cases: [1, 1],
         reference_bins: &[1, 16],
+        balls: 4,
     };
 
     fn measure(effort: CcdEffort, _scenes: &[String], progress: &Progress) -> Result<Self, StudyError> {
@@ -228,8 +260,9 @@ impl Study for CcdChart {
             }
         }
         let slides = slides(&effort, progress);
+        let narrowed = narrowed(&effort, progress)?;
         let [pairs, reference_pairs] = sets.each_ref().map(|(_, cases, _)| pairs(cases));
-        Ok(Self { effort, pairs, reference_pairs, rows, slides })
+        Ok(Self { effort, pairs, reference_pairs, rows, slides, narrowed })
     }
 
     fn draw(&self, to: &Gallery<'_>) -> Result<(), OutputError> {
@@ -238,7 +271,14 @@ impl Study for CcdChart {
         let title = "Where collision detection fails: grazing contact";
         let subject = "plates of 72 triangles that slide along each other without touching, any way round, looked at closer: the false positive rate over orientations. \
              Marked: nine in ten and more at every resolution, where a run warns (collision-near-everywhere)";
-        to.chart("ccd_failures", [title, subject], vec![self.failures()])
+        to.chart("ccd_failures", [title, subject], vec![self.failures()])?;
+        let title = "What narrowing gains on the GPU";
+        let subject = format!(
+            "quintile run ccd, {} balls, 8 pixels across and more: two sweeps over all objects along each axis, as in the paper, and pairs narrowed by the CPU \
+             from axis to axis",
+            self.effort.balls
+        );
+        to.chart("ccd_narrowing", [title, &subject], self.gains())
     }
 
     fn tables(&self) -> Vec<Sheet> {
@@ -259,6 +299,12 @@ impl Study for CcdChart {
             .shown("plates that slide: gap", |slide| slide.gap, |gap| format!("{gap:e}"))
             .shown("px", |slide| slide.resolution, plain)
             .shown("false positive rate", |slide| slide.kept, fixed(2));
+        let narrowed = TableBuilder::of(&self.narrowed)
+            .shown("on the GPU", |row| row.name(), plain)
+            .shown("px", |row| row.resolution, plain)
+            .shown("pairs kept", |row| row.kept, fixed(3))
+            .shown("ms", |row| row.gpu_s, millis(3))
+            .shown("mJ", |row| row.gpu_j, millis(3));
         let rows = TableBuilder::of(&self.rows)
             .data("cases", |row| row.cases.name())
             .data("way", |row| row.way.as_str())
@@ -268,7 +314,7 @@ impl Study for CcdChart {
             .data("missed", |row| row.missed)
             .data("pair_s", |row| row.pair_s)
             .csv("ccd.csv");
-        vec![families.sheet(), reference.sheet(), slides.sheet(), rows.sheet()]
+        vec![families.sheet(), reference.sheet(), slides.sheet(), narrowed.sheet(), rows.sheet()]
     }
 
     fn tradeoff(&self) -> Vec<TradeoffPoint> {
@@ -331,6 +377,21 @@ impl CcdChart {
                 (1e3 * row.pair_s, row.many)
             }),
         ]
+    }
+
+    /// Share of pairs kept over time and energy.
+    fn gains(&self) -> Vec<ChartPanel> {
+        let panel = |across: &str, cost: fn(&Narrowing) -> f64| {
+            let curve = |narrow: bool| {
+                let rows = || self.narrowed.iter().filter(move |row| row.narrow == narrow);
+                let name = rows().next().map_or("", Narrowing::name);
+                Series::curve(name, rows().map(|row| (1e3 * cost(row), row.kept)))
+            };
+            let curves = [false, true].map(curve).into();
+            ChartPanel::new("", [across, "pairs kept of those whose boxes touch"], curves)
+                .on(Scale::Decades, Scale::FromZero)
+        };
+        vec![panel("time on the GPU (ms)", |row| row.gpu_s), panel("energy (mJ)", |row| row.gpu_j)]
     }
 
     fn failures(&self) -> ChartPanel {
@@ -431,4 +492,30 @@ fn slides(effort: &CcdEffort, progress: &Progress) -> Vec<Slide> {
         Slide { resolution: search.resolution, gap, kept: count as f64 / effort.slides as f64 }
     });
     measured.collect()
+}
+
+/// Frames of `quintile run ccd` at each resolution, with and without narrowing.
+fn narrowed(effort: &CcdEffort, progress: &Progress) -> Result<Vec<Narrowing>, RunError> {
+    let gpu = GpuSpec::load("reference")?;
+    let model = PowerModel::new(&EnergyTable::builtin("28nm")?, &Platform::builtin("reference")?)?;
+    let each = [false, true].into_iter().flat_map(|narrow| effort.resolutions.iter().map(move |px| (narrow, *px)));
+    let bar = progress.bar("narrowing", 2 * effort.resolutions.len() as u64);
+    let frame = |(narrow, resolution): (bool, u32)| {
+        let options = [
+            ("narrow", narrow.to_string()),
+            ("resolution", resolution.to_string()),
+            ("balls", effort.balls.to_string()),
+        ];
+        let set = options.map(|(name, value)| (name.to_owned(), value)).into();
+        let request = JobRequest { overrides: &Overrides::default(), seed: 1 };
+        let frame = JobFrame::new(&*job(&OptionSource { file: None, set }, &request)?, 0, &gpu, &model)?;
+        let fact = |name: &str| {
+            frame.drawn.facts.iter().find(|fact| fact.name == name).map_or(0.0, |fact| fact.value)
+        };
+        let kept = fact("pairs_that_may_collide") / fact("pairs_whose_boxes_touch").max(1.0);
+        let (gpu_s, gpu_j) = (frame.power.duration_s(), frame.power.energy().total_j());
+        bar.inc();
+        Ok(Narrowing { narrow, resolution, kept, gpu_s, gpu_j })
+    };
+    each.map(frame).collect()
 }
