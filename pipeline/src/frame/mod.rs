@@ -2,6 +2,7 @@
 //! image. Here is the order of the work and the front end: the set-up of triangles and the packets of their
 //! vertices.
 
+mod accesses;
 mod attachments;
 mod bin;
 mod cells;

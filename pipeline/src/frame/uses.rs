@@ -1,11 +1,7 @@
 //! What passes without samples access in memory, besides the vertices of their draws: it is stated before the pass, so
 //! that dependencies are known, and what the shaders access is compared with it.
 
-use activity::{PacketCounts, Waits};
-
 use super::attachments::PassError;
-use super::gpu::Gpu;
-use super::lanes::LaneWork;
 use crate::memory::{LINE_BYTES, MemoryRange};
 
 /// Ranges of memory that the shaders of a pass access.
@@ -32,8 +28,28 @@ impl Uses {
         self
     }
 
+    /// What the texture unit reads.
+    pub(super) fn reads(&self) -> &[MemoryRange] {
+        &self.reads
+    }
+
+    /// What the units of depth and colour access.
+    pub(super) fn targets(&self) -> &[MemoryRange] {
+        &self.targets
+    }
+
+    /// Whether the texture unit may read a line.
+    pub(super) fn may_read(&self, line: u64) -> bool {
+        have(&self.reads, line)
+    }
+
+    /// Whether the units of depth and colour may access a line.
+    pub(super) fn may_target(&self, line: u64) -> bool {
+        have(&self.targets, line)
+    }
+
     /// Checks that nothing is read and written.
-    fn check(&self, pass: &str) -> Result<(), PassError> {
+    pub(super) fn check(&self, pass: &str) -> Result<(), PassError> {
         let both = self.reads.iter().find(|read| self.targets.iter().any(|target| target.overlaps(**read)));
         let Some(range) = both else { return Ok(()) };
         Err(PassError::Feedback { pass: pass.to_owned(), bytes: range.bytes(), address: range.address() })
@@ -51,67 +67,6 @@ fn have(ranges: &[MemoryRange], line: u64) -> bool {
     before > 0 && ranges[before - 1].address() + ranges[before - 1].bytes() > line
 }
 
-impl Gpu<'_> {
-    /// Checks that a pass may begin and use this memory.
-    pub(super) fn check_uses(&self, pass: &str, uses: &Uses) -> Result<(), PassError> {
-        self.check_frame(pass)?;
-        uses.check(pass)
-    }
-
-    /// States what the pass that was begun accesses, and lets it wait for earlier ones where it has to.
-    pub(super) fn use_memory(&mut self, uses: Uses) {
-        let waits = uses.reads.iter().any(|range| self.conflicts(*range, false))
-            || uses.targets.iter().any(|range| self.is_read(*range));
-        if waits {
-            self.barrier(Waits::Tiles);
-        }
-        self.uses = uses;
-        self.note_uses();
-    }
-
-    /// Lets the pass that was begun wait for those that write its vertices.
-    pub(super) fn read_vertices(&mut self, vertices: MemoryRange) {
-        if self.conflicts(vertices, false) {
-            self.barrier(Waits::All);
-            self.note_uses();
-        }
-        self.note_read(vertices.address());
-    }
-
-    fn note_uses(&mut self) {
-        self.pending.extend(&self.uses.targets);
-        self.reads.extend(self.uses.reads.iter().map(MemoryRange::address));
-    }
-
-    /// Makes the accesses of lanes, for a packet with these counts. `is_cleared` says whether a line of a target has
-    /// held nothing but the clear value so far.
-    ///
-    /// # Errors
-    /// [`PassError::Unstated`] if the pass did not state that it accesses a line.
-    pub(super) fn access(
-        &mut self,
-        work: &LaneWork,
-        counts: &mut PacketCounts,
-        mut is_cleared: impl FnMut(u64) -> bool,
-    ) -> Result<(), PassError> {
-        *counts += &work.counts;
-        let Self { memory, uses, .. } = self;
-        for access in &work.depths {
-            memory.depth(access.line, access.write, is_cleared(access.line), counts);
-        }
-        work.reads.iter().for_each(|line| memory.texture(*line, counts));
-        for access in &work.colours {
-            memory.colour(access.line, access.write, access.whole || is_cleared(access.line), counts);
-        }
-        let read = work.reads.iter().find(|line| !have(&uses.reads, **line));
-        let mut targets = work.depths.iter().chain(&work.colours).map(|access| access.line);
-        match read.copied().or_else(|| targets.find(|line| !have(&uses.targets, *line))) {
-            Some(line) => Err(PassError::Unstated { pass: self.name_of_pass().to_owned(), line }),
-            None => Ok(()),
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -124,7 +79,7 @@ mod tests {
         let uses = Uses::default().reading([ranges[3], ranges[0]]).reading([ranges[1]]);
         let end = ranges[3].address() + 128;
         let held: Vec<u64> = (0..=end / LINE_BYTES)
-            .filter(|line| have(&uses.reads, line * LINE_BYTES))
+            .filter(|line| uses.may_read(line * LINE_BYTES))
             .map(|line| line * LINE_BYTES)
             .collect();
         let expected = [0, 1, 3].iter().flat_map(|at: &usize| {
@@ -133,6 +88,6 @@ mod tests {
                 .map(|line| line * LINE_BYTES)
         });
         assert_eq!(held, expected.collect::<Vec<u64>>());
-        assert!(!have(&[], 0));
+        assert!(!uses.may_target(0));
     }
 }

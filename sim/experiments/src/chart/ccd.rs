@@ -498,7 +498,8 @@ fn slides(effort: &CcdEffort, progress: &Progress) -> Vec<Slide> {
 fn narrowed(effort: &CcdEffort, progress: &Progress) -> Result<Vec<Narrowing>, RunError> {
     let gpu = GpuSpec::load("reference")?;
     let model = PowerModel::new(&EnergyTable::builtin("28nm")?, &Platform::builtin("reference")?)?;
-    let each = [false, true].into_iter().flat_map(|narrow| effort.resolutions.iter().map(move |px| (narrow, *px)));
+    let each =
+        [false, true].into_iter().flat_map(|narrow| effort.resolutions.iter().map(move |px| (narrow, *px)));
     let bar = progress.bar("narrowing", 2 * effort.resolutions.len() as u64);
     let frame = |(narrow, resolution): (bool, u32)| {
         let options = [

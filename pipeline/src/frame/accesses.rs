@@ -1,0 +1,70 @@
+//! Accesses of passes without samples: what they wait for, and the lines that their lanes access.
+
+use activity::{PacketCounts, Waits};
+
+use super::attachments::PassError;
+use super::gpu::Gpu;
+use super::lanes::LaneWork;
+use super::uses::Uses;
+use crate::memory::MemoryRange;
+
+impl Gpu<'_> {
+    /// Checks that a pass may begin and use this memory.
+    pub(super) fn check_uses(&self, pass: &str, uses: &Uses) -> Result<(), PassError> {
+        self.check_frame(pass)?;
+        uses.check(pass)
+    }
+
+    /// States what the pass that was begun accesses, and lets it wait for earlier ones where it has to.
+    pub(super) fn use_memory(&mut self, uses: Uses) {
+        let waits = uses.reads().iter().any(|range| self.conflicts(*range, false))
+            || uses.targets().iter().any(|range| self.is_read(*range));
+        if waits {
+            self.barrier(Waits::Tiles);
+        }
+        self.uses = uses;
+        self.note_uses();
+    }
+
+    /// Lets the pass that was begun wait for those that write its vertices.
+    pub(super) fn read_vertices(&mut self, vertices: MemoryRange) {
+        if self.conflicts(vertices, false) {
+            self.barrier(Waits::All);
+            self.note_uses();
+        }
+        self.note_read(vertices.address());
+    }
+
+    fn note_uses(&mut self) {
+        self.pending.extend(self.uses.targets());
+        self.reads.extend(self.uses.reads().iter().map(MemoryRange::address));
+    }
+
+    /// Makes the accesses of lanes, for a packet with these counts. `is_cleared` says whether a line of a target has
+    /// held nothing but the clear value so far.
+    ///
+    /// # Errors
+    /// [`PassError::Unstated`] if the pass did not state that it accesses a line.
+    pub(super) fn access(
+        &mut self,
+        work: &LaneWork,
+        counts: &mut PacketCounts,
+        mut is_cleared: impl FnMut(u64) -> bool,
+    ) -> Result<(), PassError> {
+        *counts += &work.counts;
+        let Self { memory, uses, .. } = self;
+        for access in &work.depths {
+            memory.depth(access.line, access.write, is_cleared(access.line), counts);
+        }
+        work.reads.iter().for_each(|line| memory.texture(*line, counts));
+        for access in &work.colours {
+            memory.colour(access.line, access.write, access.whole || is_cleared(access.line), counts);
+        }
+        let read = work.reads.iter().find(|line| !uses.may_read(**line));
+        let mut targets = work.depths.iter().chain(&work.colours).map(|access| access.line);
+        match read.copied().or_else(|| targets.find(|line| !uses.may_target(*line))) {
+            Some(line) => Err(PassError::Unstated { pass: self.name_of_pass().to_owned(), line }),
+            None => Ok(()),
+        }
+    }
+}
