@@ -147,7 +147,7 @@ pub struct PacketClock {
 }
 
 /// Longest frame in core cycles, half a second to some seconds of hardware time. Calendars of shared
-/// resources take about three bytes per cycle.
+/// resources take up to about nine bytes per cycle.
 pub(crate) const MAX_CYCLES: u64 = 1 << 30;
 
 /// Most changes between draws that are remembered; they are for slices of draws that do not take turns.
