@@ -5,7 +5,7 @@ use activity::{PacketCounts, Waits};
 use super::attachments::PassError;
 use super::gpu::Gpu;
 use super::lanes::LaneWork;
-use super::uses::Uses;
+use super::uses::{Uses, Writer};
 use crate::memory::MemoryRange;
 
 impl Gpu<'_> {
@@ -18,7 +18,7 @@ impl Gpu<'_> {
     /// States what the pass that was begun accesses, and lets it wait for earlier ones where it has to.
     pub(super) fn use_memory(&mut self, uses: Uses) {
         let waits = uses.reads().iter().any(|range| self.conflicts(*range, false))
-            || uses.targets().iter().any(|range| self.is_read(*range));
+            || uses.targets().any(|(range, by)| self.is_read(range) || self.is_written_by_others(range, by));
         if waits {
             self.barrier(Waits::Tiles);
         }
@@ -35,9 +35,23 @@ impl Gpu<'_> {
         self.note_read(vertices.address());
     }
 
+    /// Whether a unit other than `by` wrote bytes of a range since the last barrier.
+    fn is_written_by_others(&self, range: MemoryRange, by: Writer) -> bool {
+        self.pending.iter().any(|(pending, writer)| *writer != by && pending.overlaps(range))
+    }
+
     fn note_uses(&mut self) {
         self.pending.extend(self.uses.targets());
         self.reads.extend(self.uses.reads().iter().map(MemoryRange::address));
+    }
+
+    /// Writes the clear value to a line of a target of the pass that was begun.
+    pub(super) fn clear_line(&mut self, line: u64, counts: &mut PacketCounts) {
+        if self.uses.may_be_depth(line) {
+            self.memory.depth(line, true, true, counts);
+        } else {
+            self.memory.colour(line, true, true, counts);
+        }
     }
 
     /// Makes the accesses of lanes, for a packet with these counts. `is_cleared` says whether a line of a target has
@@ -58,11 +72,12 @@ impl Gpu<'_> {
         }
         work.reads.iter().for_each(|line| memory.texture(*line, counts));
         for access in &work.colours {
-            memory.colour(access.line, access.write, access.whole || is_cleared(access.line), counts);
+            memory.colour(access.line, access.write, is_cleared(access.line), counts);
         }
         let read = work.reads.iter().find(|line| !uses.may_read(**line));
-        let mut targets = work.depths.iter().chain(&work.colours).map(|access| access.line);
-        match read.copied().or_else(|| targets.find(|line| !uses.may_target(*line))) {
+        let depth = work.depths.iter().map(|access| access.line).find(|line| !uses.may_be_depth(*line));
+        let colour = work.colours.iter().map(|access| access.line).find(|line| !uses.may_be_colour(*line));
+        match read.copied().or(depth).or(colour) {
             Some(line) => Err(PassError::Unstated { pass: self.name_of_pass().to_owned(), line }),
             None => Ok(()),
         }

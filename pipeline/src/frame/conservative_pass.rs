@@ -16,8 +16,8 @@ use super::lanes::{LaneWork, Lanes};
 use super::uses::Uses;
 use crate::conservative::{Grid, MovingTriangle, Rasterizer, TileLoop, Touch};
 use crate::depth::{Numbers, Real};
-use crate::geometry::Projection;
-use crate::memory::MemoryRange;
+use crate::geometry::{Projection, Viewport};
+use crate::memory::{LINE_BYTES, MemoryRange};
 use crate::setup::difference_madds;
 use crate::tally::{Costs, Kernel};
 
@@ -25,6 +25,9 @@ use crate::tally::{Costs, Kernel};
 const BATCH: usize = 32;
 /// Triangles whose tiles are in memory at once.
 const TRIANGLES_AT_ONCE: usize = 4096;
+
+/// Lines of a packet that stores what was cleared.
+const LINES_OF_PACKET: usize = 16;
 
 /// A triangle in conservative mode.
 #[derive(Clone, Debug)]
@@ -242,6 +245,33 @@ impl ConservativePass {
             }
         }
         Ok(())
+    }
+
+    /// Runs a program for each pixel of an image, as [`Gpu::shade_pixels`] does, on the targets of this pass.
+    ///
+    /// # Errors
+    /// As [`Self::draw`].
+    pub fn run_pixels<T: Clone + Default + Send>(
+        &mut self,
+        gpu: &mut Gpu<'_>,
+        viewport: Viewport,
+        pixel: impl Fn(&Lanes, [u32; 2]) -> T + Sync,
+    ) -> Result<Vec<T>, PassError> {
+        gpu.run_pixels(viewport, &mut self.written, pixel)
+    }
+
+    /// Stores a range of the targets, for later passes or for the host: lines that still hold the clear value are
+    /// written.
+    pub fn store(&mut self, gpu: &mut Gpu<'_>, range: MemoryRange) {
+        gpu.end_draws();
+        let lines = range.address() / LINE_BYTES..(range.address() + range.bytes()).div_ceil(LINE_BYTES);
+        let lines: Vec<u64> =
+            lines.map(|line| line * LINE_BYTES).filter(|line| self.written.insert(*line)).collect();
+        for (number, lines) in (0..).zip(lines.chunks(LINES_OF_PACKET)) {
+            let mut packet = gpu.packet(PacketKind::Resolve, number, None);
+            lines.iter().for_each(|line| gpu.clear_line(*line, &mut packet.counts));
+            gpu.push(&packet, 0);
+        }
     }
 
     /// Emits the packets of a body, one for each triangle and block of tiles.

@@ -1,6 +1,8 @@
 //! Passes without triangles. Dispatch of groups: they run in parallel, and their packets follow in the order
 //! of the groups. Full-screen passes: a program runs for every pixel of an image, tile by tile.
 
+use std::collections::HashSet;
+
 use activity::{Counts, Event, Packet, PacketCounts, PacketKind, Waits};
 use glam::Vec3;
 use rayon::prelude::*;
@@ -154,11 +156,11 @@ impl Gpu<'_> {
     ) -> Result<Rendered, PassError> {
         let tiles = Tiles { viewport, side: self.spec().tile_px };
         let image = self.allocate(tiles.count() * tiles.pixels() * PIXEL_BYTES);
-        let uses = uses.targeting([image]);
+        let uses = uses.colours([image]);
         self.check_uses(name, &uses)?;
         self.open(name, Some(viewport));
         self.use_memory(uses);
-        let colours = self.run_pixels(viewport, |lanes, at| {
+        let colours = self.run_pixels(viewport, &mut HashSet::new(), |lanes, at| {
             let colour = pixel(lanes, at);
             lanes.write(image, tiles.place(at) * PIXEL_BYTES, PIXEL_BYTES);
             colour
@@ -174,13 +176,15 @@ impl Gpu<'_> {
     }
 
     /// Runs a program for the pixel at every column and row, in the pass that was begun, in quads as
-    /// [`Self::shade_pixels`]. Returns its values, row by row.
+    /// [`Self::shade_pixels`]. Returns its values, row by row. Lines of targets that are not in `written` hold the clear
+    /// value, or nothing.
     ///
     /// # Errors
     /// [`PassError::Unstated`] if lanes access memory that the pass does not state.
-    pub fn run_pixels<T: Clone + Default + Send>(
+    pub(super) fn run_pixels<T: Clone + Default + Send>(
         &mut self,
         viewport: Viewport,
+        written: &mut HashSet<u64>,
         pixel: impl Fn(&Lanes, [u32; 2]) -> T + Sync,
     ) -> Result<Vec<T>, PassError> {
         self.end_draws();
@@ -209,7 +213,7 @@ impl Gpu<'_> {
                 }
                 let tile = y0 / side * columns.len() as u32 + column;
                 let mut packet = self.packet(PacketKind::Tile, tile, None);
-                self.access(&work, &mut packet.counts, |_| false)?;
+                self.access(&work, &mut packet.counts, |line| written.insert(line))?;
                 let of = [viewport.width(), viewport.height()];
                 let end = [(*x0 + side).min(of[0]), (y0 + side).min(of[1])];
                 self.push_block(&packet, &Block { first: [*x0, y0], end, of });

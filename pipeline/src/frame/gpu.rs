@@ -12,7 +12,7 @@ use super::heat::{Block, FrameHeat, HeatMap, Placement};
 use super::pass::{AddressMap, Draw, Pass, RasterPass, Resident, Target, resident};
 use super::replay::Replay;
 use super::seen::Seen;
-use super::uses::Uses;
+use super::uses::{Uses, Writer};
 use super::{Finished, PipelineSpec, rasterize, resolve, seen};
 use crate::buffer::Buffers;
 use crate::geometry::Viewport;
@@ -34,7 +34,7 @@ pub struct Gpu<'e> {
     /// Results of passes, which are in memory when the frame ends.
     results: Vec<MemoryRange>,
     /// Results since the last barrier: other units cannot read them yet.
-    pub(super) pending: Vec<MemoryRange>,
+    pub(super) pending: Vec<(MemoryRange, Writer)>,
     /// Surfaces that passes may write and read.
     pub(super) surfaces: Surfaces,
     /// First addresses of what passes since the last barrier read: the reads may still be going on.
@@ -320,12 +320,12 @@ impl<'e> Gpu<'e> {
 
     /// Whether a pass that reads or writes `region` has to wait for earlier ones.
     pub(super) fn conflicts(&self, region: MemoryRange, writes: bool) -> bool {
-        self.pending.iter().any(|pending| pending.overlaps(region)) || (writes && self.is_read(region))
+        self.pending.iter().any(|(pending, _)| pending.overlaps(region)) || (writes && self.is_read(region))
     }
 
     /// Whether what is at `address` was written since the last barrier.
     fn is_pending(&self, address: u64) -> bool {
-        self.pending.iter().any(|region| region.contains(address))
+        self.pending.iter().any(|(region, _)| region.contains(address))
     }
 
     /// Whether a pass since the last barrier reads `region`.
@@ -402,7 +402,9 @@ impl<'e> Gpu<'e> {
     /// Marks a region as a result of the last pass.
     pub fn keep(&mut self, region: MemoryRange) {
         self.results.push(region);
-        self.pending.push(region);
+        if !self.pending.iter().any(|(known, _)| *known == region) {
+            self.pending.push((region, Writer::Other));
+        }
     }
 
     /// Lets all later work wait for the work so far, and makes its results readable.
@@ -497,7 +499,7 @@ impl<'e> Gpu<'e> {
         self.buffers.outdate(place);
         // What was stored before is no longer a result either.
         self.results.retain(|result| *result != place);
-        self.pending.retain(|result| *result != place);
+        self.pending.retain(|(result, _)| *result != place);
         if is_stored {
             self.keep(place);
         }

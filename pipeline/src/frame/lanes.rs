@@ -39,8 +39,6 @@ pub(super) struct TargetLine {
     pub line: u64,
     /// Whether anything is written.
     pub write: bool,
-    /// Whether all that is accessed is overwritten, so that nothing is fetched.
-    pub whole: bool,
 }
 
 /// Lines of a range.
@@ -118,26 +116,27 @@ impl Lanes {
         self.runs.take()
     }
 
-    /// Counts the lanes of quads, by the programs that each of them ran. The n-th programs of the lanes of a
-    /// warp run in step, and each takes as long as the longest. A lane without an n-th program in a quad that
-    /// has one is a helper.
+    /// Counts the lanes of quads, by the programs that each of them ran. Those n-th programs of the lanes of a warp that
+    /// are the same run in step, as long as the longest. A lane without an n-th program in a quad that has one is a
+    /// helper. Quads read one after the other, as in passes of triangles.
     pub(super) fn count_quads(&self, quads: &[[Vec<Run>; 4]], warp_lanes: u32) {
         let (all, mut read) = (self.reads.take(), Vec::new());
-        for nth in 0..quads.as_flattened().iter().map(Vec::len).max().unwrap_or(0) {
-            let mut warps = Warps::new(warp_lanes);
-            for quad in quads {
+        let steps = quads.as_flattened().iter().map(Vec::len).max().unwrap_or(0);
+        let mut programs: Vec<Programs> = (0..steps).map(|_| Programs::default()).collect();
+        for quad in quads {
+            for (nth, programs) in programs.iter_mut().enumerate() {
                 let lanes = quad.each_ref().map(|runs| runs.get(nth));
-                let Some(longest) = lanes.iter().flatten().map(|run| run.ops).max() else { continue };
-                warps.start(lanes.len() as u32, longest);
+                let helpers = lanes.iter().filter(|lane| lane.is_none()).count();
+                if helpers == lanes.len() {
+                    break;
+                }
+                programs.start(lanes, warp_lanes);
                 self.count(Event::PixelInvocations, lanes.len() as u32);
-                self.count(
-                    Event::HelperInvocations,
-                    lanes.iter().filter(|lane| lane.is_none()).count() as u32,
-                );
+                self.count(Event::HelperInvocations, helpers as u32);
                 read.extend(self.read_by_quad(lanes, &all));
             }
-            self.count(Event::ShaderOps, warps.ops());
         }
+        self.count(Event::ShaderOps, programs.into_iter().map(Programs::ops).sum());
         self.ended.set(read.len());
         self.reads.replace(read);
     }
@@ -186,27 +185,27 @@ impl Lanes {
     /// Reads what is stored at the tile, through the depth unit, which works in the order of triangles.
     pub fn read(&self, target: MemoryRange, offset: u64, bytes: u64) {
         self.count(Event::DepthReads, words(bytes));
-        access(&self.depths, target.address() + offset, bytes, [false; 2]);
+        access(&self.depths, target.address() + offset, bytes, false);
     }
 
     /// Combines a result with what is stored at the tile, through the depth unit.
     pub fn merge(&self, target: MemoryRange, offset: u64, bytes: u64) {
         self.count(Event::DepthReads, words(bytes));
         self.count(Event::DepthWrites, words(bytes));
-        access(&self.depths, target.address() + offset, bytes, [true, false]);
+        access(&self.depths, target.address() + offset, bytes, true);
     }
 
     /// Adds a colour of `bytes` to the stored one.
     pub fn blend(&self, target: MemoryRange, offset: u64, bytes: u64) {
         self.count(Event::ColourWrites, words(bytes));
         self.count(Event::SamplesBlended, words(bytes));
-        access(&self.colours, target.address() + offset, bytes, [true, false]);
+        access(&self.colours, target.address() + offset, bytes, true);
     }
 
     /// Writes a colour of `bytes`.
     pub fn write(&self, target: MemoryRange, offset: u64, bytes: u64) {
         self.count(Event::ColourWrites, words(bytes));
-        access(&self.colours, target.address() + offset, bytes, [true; 2]);
+        access(&self.colours, target.address() + offset, bytes, true);
     }
 
     /// Times at which a point of the image is inside a moving triangle, by face: the sample test of all times
@@ -243,16 +242,10 @@ impl Lanes {
     /// the order in which they ran.
     pub(super) fn finish(&self, warp_lanes: u32) -> LaneWork {
         let runs = self.take_runs();
-        let mut programs: Vec<(&Location<'_>, Warps)> = Vec::new();
-        for Run { program, ops, .. } in &runs {
-            let place = programs.iter().position(|(known, _)| known == program).unwrap_or(programs.len());
-            if place == programs.len() {
-                programs.push((*program, Warps::new(warp_lanes)));
-            }
-            programs[place].1.start(1, *ops);
-        }
+        let mut programs = Programs::default();
+        runs.iter().for_each(|run| programs.of(run.program, warp_lanes).start(1, run.ops));
         self.count(Event::PixelInvocations, runs.len() as u32);
-        self.count(Event::ShaderOps, programs.into_iter().map(|(_, warps)| warps.ops()).sum());
+        self.count(Event::ShaderOps, programs.ops());
         self.ended.set(0);
         LaneWork {
             counts: self.counts.take(),
@@ -263,14 +256,45 @@ impl Lanes {
     }
 }
 
+/// Warps by program: lanes of different programs do not share any.
+#[derive(Default)]
+struct Programs(Vec<(&'static Location<'static>, Warps)>);
+
+impl Programs {
+    fn of(&mut self, program: &'static Location<'static>, warp_lanes: u32) -> &mut Warps {
+        let place = self.0.iter().position(|(known, _)| *known == program).unwrap_or(self.0.len());
+        if place == self.0.len() {
+            self.0.push((program, Warps::new(warp_lanes)));
+        }
+        &mut self.0[place].1
+    }
+
+    /// Starts a quad in each program that any of its lanes runs.
+    fn start(&mut self, lanes: [Option<&Run>; 4], warp_lanes: u32) {
+        for (at, run) in lanes.iter().enumerate().filter_map(|(at, run)| Some((at, (*run)?))) {
+            let same = |other: &&&Run| other.program == run.program;
+            if lanes[..at].iter().flatten().any(|other| same(&other)) {
+                continue;
+            }
+            let longest = lanes.iter().flatten().filter(same).map(|run| run.ops).max().unwrap_or(0);
+            self.of(run.program, warp_lanes).start(lanes.len() as u32, longest);
+        }
+    }
+
+    /// Operations of all lanes.
+    fn ops(self) -> u32 {
+        self.0.into_iter().map(|(_, warps)| warps.ops()).sum()
+    }
+}
+
 /// Fetches of the texture unit that made these reads.
 fn fetches(reads: &[Read]) -> u32 {
     reads.chunk_by(|a, b| a.load.is_some() && a.load == b.load).count() as u32
 }
 
-/// Adds the lines of a range to those of a unit; `write` and `whole` as in [`TargetLine`].
-fn access(unit: &RefCell<Vec<TargetLine>>, address: u64, bytes: u64, [write, whole]: [bool; 2]) {
-    unit.borrow_mut().extend(lines(address, bytes).map(|line| TargetLine { line, write, whole }));
+/// Adds the lines of a range to those of a unit.
+fn access(unit: &RefCell<Vec<TargetLine>>, address: u64, bytes: u64, write: bool) {
+    unit.borrow_mut().extend(lines(address, bytes).map(|line| TargetLine { line, write }));
 }
 
 /// Each line once, by address: a packet accesses a line of a target once, as in passes of triangles.
@@ -280,7 +304,6 @@ fn merged(mut lines: Vec<TargetLine>) -> Vec<TargetLine> {
         let same = next.line == kept.line;
         if same {
             kept.write |= next.write;
-            kept.whole &= next.whole;
         }
         same
     });

@@ -355,7 +355,7 @@ fn planes(
     let depth = |place| Plane::inner(place, depth_of(pass.clear));
     if !has_images {
         // The depths of a depth pass are its result.
-        return (depth(space.take(bytes)), Vec::new());
+        return (Plane { is_stored: true, ..depth(space.take(bytes)) }, Vec::new());
     }
     let [depths, colours] = space.samples(bytes);
     (depth(depths), vec![Plane::inner(colours, pass.settings.background.extend(1.0))])

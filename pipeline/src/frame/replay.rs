@@ -300,16 +300,14 @@ impl<'a> Replay<'a> {
         tile_lines([first_byte, pixel_bytes], pixels, |line, held| each(self, line, held));
     }
 
-    /// Emit the packets that end the tiles of a bin: their samples are resolved, or stored in surfaces.
-    /// Depths of a depth pass stay where they are.
+    /// Emit the packets that end the tiles of a bin: their samples are resolved, or stored: in surfaces, or as the
+    /// depths of a depth pass.
     pub fn resolve(&mut self, batch: u32, bin: &Bin, emit: &mut impl FnMut(&Packet, &[LineAccess])) {
         for (tile, _, pixels, touched) in bin.inside(self.pass) {
-            let packet = if self.pass.is_attached {
+            let packet = if self.pass.is_attached || self.pass.is_depth_only() {
                 self.store_tile(tile, pixels)
-            } else if !self.pass.is_depth_only() {
-                Some(self.resolve_tile(tile, pixels, touched))
             } else {
-                None
+                Some(self.resolve_tile(tile, pixels, touched))
             };
             if let Some(packet) = packet {
                 self.emit(&Packet { batch, ..packet }, emit);
@@ -333,7 +331,7 @@ impl<'a> Replay<'a> {
                 }
             });
         }
-        if pass.depth.format.is_some() {
+        if pass.depth.format.is_some() || pass.is_depth_only() {
             let plane = &pass.depth;
             self.lines(tile, pixels, plane.sample_bytes, |this, line, _| {
                 let address = plane.place.address() + line * LINE_BYTES;

@@ -9,7 +9,19 @@ use crate::memory::{LINE_BYTES, MemoryRange};
 pub struct Uses {
     /// By address.
     reads: Vec<MemoryRange>,
-    targets: Vec<MemoryRange>,
+    depths: Vec<MemoryRange>,
+    colours: Vec<MemoryRange>,
+}
+
+/// What writes a range.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Writer {
+    /// The unit of depth, in the order of passes.
+    Depth,
+    /// The unit of colour, in the order of passes.
+    Colour,
+    /// Another unit, or a pass of triangles.
+    Other,
 }
 
 impl Uses {
@@ -20,11 +32,18 @@ impl Uses {
         self
     }
 
-    /// With ranges that the units of depth and colour read or write. They work in the order of passes, so the pass only
-    /// waits for earlier ones whose texture units read them.
+    /// With ranges that the unit of depth reads or writes. It works in the order of passes, so the pass only waits for
+    /// earlier ones whose other units access them.
     #[must_use]
-    pub fn targeting(mut self, ranges: impl IntoIterator<Item = MemoryRange>) -> Self {
-        add(&mut self.targets, ranges);
+    pub fn depths(mut self, ranges: impl IntoIterator<Item = MemoryRange>) -> Self {
+        add(&mut self.depths, ranges);
+        self
+    }
+
+    /// The same of the unit of colour.
+    #[must_use]
+    pub fn colours(mut self, ranges: impl IntoIterator<Item = MemoryRange>) -> Self {
+        add(&mut self.colours, ranges);
         self
     }
 
@@ -34,8 +53,10 @@ impl Uses {
     }
 
     /// What the units of depth and colour access.
-    pub(super) fn targets(&self) -> &[MemoryRange] {
-        &self.targets
+    pub(super) fn targets(&self) -> impl Iterator<Item = (MemoryRange, Writer)> {
+        let of =
+            |ranges: &[MemoryRange], by| ranges.iter().map(move |range| (*range, by)).collect::<Vec<_>>();
+        of(&self.depths, Writer::Depth).into_iter().chain(of(&self.colours, Writer::Colour))
     }
 
     /// Whether the texture unit may read a line.
@@ -43,14 +64,19 @@ impl Uses {
         have(&self.reads, line)
     }
 
-    /// Whether the units of depth and colour may access a line.
-    pub(super) fn may_target(&self, line: u64) -> bool {
-        have(&self.targets, line)
+    /// Whether the unit of depth may access a line.
+    pub(super) fn may_be_depth(&self, line: u64) -> bool {
+        have(&self.depths, line)
+    }
+
+    /// Whether the unit of colour may access a line.
+    pub(super) fn may_be_colour(&self, line: u64) -> bool {
+        have(&self.colours, line)
     }
 
     /// Checks that nothing is read and written.
     pub(super) fn check(&self, pass: &str) -> Result<(), PassError> {
-        let both = self.reads.iter().find(|read| self.targets.iter().any(|target| target.overlaps(**read)));
+        let both = self.reads.iter().find(|read| self.targets().any(|(target, _)| target.overlaps(**read)));
         let Some(range) = both else { return Ok(()) };
         Err(PassError::Feedback { pass: pass.to_owned(), bytes: range.bytes(), address: range.address() })
     }
@@ -88,6 +114,6 @@ mod tests {
                 .map(|line| line * LINE_BYTES)
         });
         assert_eq!(held, expected.collect::<Vec<u64>>());
-        assert!(!uses.may_target(0));
+        assert!(!uses.may_be_depth(0) && !uses.may_be_colour(0));
     }
 }

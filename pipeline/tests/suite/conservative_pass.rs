@@ -57,7 +57,7 @@ fn drawn(primitives: &[Primitive], block: u32) -> (Vec<Tile>, Vec<PacketKind>, C
     .unwrap();
     let [target, vertices] = [64 * 4, 3 * 24 * primitives.len() as u64].map(|bytes| gpu.allocate(bytes));
     let shader = Merge { target, runs: AtomicU32::new(0) };
-    let uses = Uses::default().targeting([target]);
+    let uses = Uses::default().depths([target]);
     let mut pass = gpu.begin_conservative("boxes", None, uses).unwrap();
     let draw =
         ConservativeDraw { primitives, grid: &GRID, block, vertices, vertex_bytes: 24, projection: None };
@@ -212,6 +212,18 @@ fn lanes_of_a_full_screen_pass_wait_for_their_warp() {
     // A second program of three lanes of two quads.
     let second = |at: [u32; 2]| if [[0, 0], [1, 1], [8, 0]].contains(&at) { vec![3, 7] } else { vec![3] };
     assert_eq!(counts(second), [128 + 8, 8 - 3, 3 * 128 + 7 * 8]);
+    // Lanes of a quad that run different programs take turns.
+    let mut gpu = Gpu::without_packets(&spec).unwrap();
+    let turns = gpu.shade_pixels("turns", Viewport::new(2, 2).unwrap(), Uses::default(), |lanes, [x, _]| {
+        let adds = |lane: &Lane, count: u32| (0..count).for_each(|_| assert!(lane.add(1.0, 2.0) > 0.0));
+        if x == 0 {
+            lanes.run(|lane| adds(lane, 5))
+        } else {
+            lanes.run(|lane| adds(lane, 7))
+        }
+        Vec3::ZERO
+    });
+    assert_eq!(turns.unwrap().counts[Event::ShaderOps], 4 * 5 + 4 * 7);
     // Quads that run nothing are not started.
     assert_eq!(counts(|[x, _]| if x < 3 { vec![2] } else { vec![] }), [2 * 4 * 4, 8, 2 * 32]);
     let corners = [[0.5, 0.5, 2.0], [3.5, 0.5, 2.0], [0.5, 1.5, 4.0]];
@@ -297,13 +309,51 @@ fn dependencies_follow_from_the_uses() {
         drop(gpu);
         waits
     };
-    let (reads, writes) =
-        (|range| Uses::default().reading([range]), |range| Uses::default().targeting([range]));
+    let (reads, writes) = (|range| Uses::default().reading([range]), |range| Uses::default().depths([range]));
     assert_eq!(waits(writes, reads), [(1, Waits::Tiles)]);
     assert_eq!(waits(reads, writes), [(1, Waits::Tiles)]);
     assert_eq!(waits(reads, reads), []);
-    // The units of depth and colour work in order.
+    // Each of the units of depth and colour works in order.
+    let blends = |range| Uses::default().colours([range]);
     assert_eq!(waits(writes, writes), []);
+    assert_eq!(waits(blends, blends), []);
+    assert_eq!(waits(writes, blends), [(1, Waits::Tiles)]);
+}
+
+/// A pass that stores a target writes the lines that still hold the clear value, each once, and pixels of the pass do
+/// not fetch them.
+#[test]
+fn stored_targets_are_written_whole() {
+    let spec = spec(Features::ALL);
+    let mut gpu = Gpu::without_packets(&spec).unwrap();
+    let [target, vertices] = [64 * 64, 72].map(|bytes| gpu.allocate(bytes));
+    let corners = [[0.5, 0.5, 2.0], [3.5, 0.5, 2.0], [0.5, 1.5, 4.0]];
+    let primitives = [primitive([corners; 2], 0)];
+    let draw = ConservativeDraw {
+        primitives: &primitives,
+        grid: &GRID,
+        block: 8,
+        vertices,
+        vertex_bytes: 24,
+        projection: None,
+    };
+    let shader = Merge { target, runs: AtomicU32::new(0) };
+    let mut pass = gpu.begin_conservative("boxes", None, Uses::default().depths([target])).unwrap();
+    pass.draw(&mut gpu, &draw, &shader, |_, _| ()).unwrap();
+    let reads = |gpu: &Gpu<'_>| gpu.counts_of_pass()[Event::L2Reads];
+    let before = reads(&gpu);
+    let read = pass.run_pixels(&mut gpu, Viewport::new(8, 8).unwrap(), |lanes, [x, y]| {
+        lanes.read(target, u64::from(64 * (8 * y + x)) / 2, 4);
+    });
+    assert_eq!(read.map(|values| values.len()), Ok(64));
+    assert_eq!(reads(&gpu), before, "cleared lines are not fetched");
+    let lines = gpu.counts_of_pass()[Event::DepthLines];
+    pass.store(&mut gpu, target);
+    assert_eq!(gpu.counts_of_pass()[Event::DepthLines] - lines, 32, "the other half of the lines");
+    pass.store(&mut gpu, target);
+    assert_eq!(gpu.counts_of_pass()[Event::DepthLines] - lines, 32);
+    gpu.keep(target);
+    assert_eq!(gpu.finish().counts()[Event::DramWriteBytes], 64 * 64);
 }
 
 /// Vertices that an earlier pass wrote let the front end wait, too.
@@ -329,8 +379,8 @@ fn written_vertices_are_waited_for() {
         projection: None,
     };
     let shader = Merge { target, runs: AtomicU32::new(0) };
-    gpu.begin_conservative("vertices", None, Uses::default().targeting([vertices])).unwrap();
-    let mut pass = gpu.begin_conservative("triangles", None, Uses::default().targeting([target])).unwrap();
+    gpu.begin_conservative("vertices", None, Uses::default().depths([vertices])).unwrap();
+    let mut pass = gpu.begin_conservative("triangles", None, Uses::default().depths([target])).unwrap();
     for _ in 0..2 {
         pass.draw(&mut gpu, &draw, &shader, |_, _| ()).unwrap();
     }
@@ -349,7 +399,7 @@ fn uses_are_checked() {
     let (spec, viewport) = (spec(Features::ALL), Viewport::new(8, 8).unwrap());
     let mut gpu = Gpu::without_packets(&spec).unwrap();
     let [range, other] = [(); 2].map(|()| gpu.allocate(256));
-    let both = Uses::default().reading([other, range]).targeting([range]);
+    let both = Uses::default().reading([other, range]).depths([range]);
     let refused = gpu.begin_conservative("light", None, both).unwrap_err();
     assert!(
         refused.to_string().starts_with("pass `light`: its texture unit reads the 256 bytes from address")
@@ -362,8 +412,7 @@ fn uses_are_checked() {
         drawn.map(|_| ())
     };
     let unstated = Err(PassError::Unstated { pass: "look".to_owned(), line: range.address() });
-    let (reads, targets) =
-        (|| Uses::default().reading([range]), || Uses::default().targeting([range, other]));
+    let (reads, targets) = (|| Uses::default().reading([range]), || Uses::default().depths([range, other]));
     for (uses, is_read) in [(Uses::default(), false), (reads(), true), (targets(), false)] {
         let expected = if is_read { Ok(()) } else { unstated.clone() };
         assert_eq!(run(uses.clone(), |lanes, range| lanes.load(range.address(), 4)), expected);
@@ -372,7 +421,8 @@ fn uses_are_checked() {
     for (uses, is_target) in [(Uses::default(), false), (reads(), false), (targets(), true)] {
         let expected = if is_target { Ok(()) } else { unstated.clone() };
         assert_eq!(run(uses.clone(), |lanes, range| lanes.merge(range, 0, 4)), expected);
-        assert_eq!(run(uses, |lanes, range| lanes.blend(range, 0, 4)), expected);
+        let colours = if is_target { unstated.clone() } else { expected };
+        assert_eq!(run(uses, |lanes, range| lanes.blend(range, 0, 4)), colours);
     }
 }
 
@@ -435,7 +485,7 @@ fn heat_maps_have_the_work_on_tiles_in_their_pixels() {
         let shader = Merge { target, runs: AtomicU32::new(0) };
         let placement = Placement { first: [0.5, 1.0], last: [1.0, 0.0] };
         let mut pass =
-            gpu.begin_conservative("boxes", Some(placement), Uses::default().targeting([target])).unwrap();
+            gpu.begin_conservative("boxes", Some(placement), Uses::default().depths([target])).unwrap();
         let draw = ConservativeDraw {
             primitives: &primitives,
             grid: &GRID,

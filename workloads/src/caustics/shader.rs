@@ -128,7 +128,7 @@ pub(super) fn draw_stored(
         vertex_bytes: input.vertex_bytes,
         projection: Some(eye.projection()),
     };
-    let uses = Uses::default().reading([input.beams]).targeting([region, marks]);
+    let uses = Uses::default().reading([input.beams]).colours([region]).depths([marks]);
     let shader = LightShader { eye, seen: &seen, faces: &faces, light, buffer, input, marks };
     // The last tiles may reach beyond the image.
     let last = [(columns, viewport.width()), (rows, viewport.height())]
@@ -143,6 +143,7 @@ pub(super) fn draw_stored(
             picture.useful += u64::from(light > 0.0);
         }
     })?;
+    pass.store(gpu, region);
     Ok((picture, buffer))
 }
 

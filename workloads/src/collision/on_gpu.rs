@@ -117,6 +117,7 @@ impl<'a, 'e> PassesOnGpu<'a, 'e> {
     /// The answers of a pass are in memory when it ends, for the host to read.
     fn end_pass(&mut self) {
         if std::mem::take(&mut self.answered) > 0 {
+            self.pass.store(self.gpu, self.answers);
             self.gpu.keep(self.answers);
         }
     }
@@ -228,7 +229,7 @@ impl PassBackend for PassesOnGpu<'_, '_> {
         if follows {
             self.gpu.wait();
         }
-        let uses = Uses::default().targeting(self.boxes).targeting([self.answers]);
+        let uses = Uses::default().depths(self.boxes).depths([self.answers]);
         let begun = self.gpu.begin_conservative(name, Some(self.picture.placement(pass)), uses);
         let begun = begun.map(|pass| self.pass = pass);
         self.is_drawn(begun);
@@ -282,7 +283,7 @@ impl PassBackend for PassesOnGpu<'_, '_> {
         let Some(viewport) = Viewport::new(columns, rows) else { return };
         let (targets, layout) = (self.boxes, self.layout);
         let (answers, answer, method) = (self.answers, self.next_answer(), self.method);
-        let compared = self.gpu.run_pixels(viewport, |lanes, tile| {
+        let compared = self.pass.run_pixels(self.gpu, viewport, |lanes, tile| {
             for bin in 0..bins {
                 let place = pass.place(tile, bin);
                 let offset = layout.offset(tile, bin);

@@ -299,7 +299,7 @@ pub(super) fn draw(
     let (mut all, mut ordered) = (Kept::default(), Vec::new());
     // The image shows the whole of x and y, the larger y above.
     let placement = Placement { first: [0.0, 1.0], last: [1.0, 0.0] };
-    let mut pass = gpu.begin_conservative(name, Some(placement), Uses::default().targeting([results]))?;
+    let mut pass = gpu.begin_conservative(name, Some(placement), Uses::default().colours([results]))?;
     pass.draw(gpu, &draw, &shader, |_, tried| {
         all.fragments += 1;
         all.candidates += u64::from(tried.candidates);
