@@ -1,10 +1,12 @@
 //! Accesses of passes without samples: what they wait for, and the lines that their lanes access.
 
+use std::collections::HashSet;
+
 use activity::{PacketCounts, Waits};
 
 use super::attachments::PassError;
 use super::gpu::Gpu;
-use super::lanes::LaneWork;
+use super::lanes::{LaneWork, TargetLine};
 use super::uses::{Uses, Writer};
 use crate::memory::MemoryRange;
 
@@ -54,8 +56,8 @@ impl Gpu<'_> {
         }
     }
 
-    /// Makes the accesses of lanes, for a packet with these counts. `is_cleared` says whether a line of a target has
-    /// held nothing but the clear value so far.
+    /// Makes the accesses of lanes, for a packet with these counts. Lines of targets that are not in `written` have held
+    /// nothing but the clear value so far.
     ///
     /// # Errors
     /// [`PassError::Unstated`] if the pass did not state that it accesses a line.
@@ -63,16 +65,19 @@ impl Gpu<'_> {
         &mut self,
         work: &LaneWork,
         counts: &mut PacketCounts,
-        mut is_cleared: impl FnMut(u64) -> bool,
+        written: &mut HashSet<u64>,
     ) -> Result<(), PassError> {
         *counts += &work.counts;
         let Self { memory, uses, .. } = self;
+        let mut is_cleared = |access: &TargetLine| {
+            if access.write { written.insert(access.line) } else { !written.contains(&access.line) }
+        };
         for access in &work.depths {
-            memory.depth(access.line, access.write, is_cleared(access.line), counts);
+            memory.depth(access.line, access.write, is_cleared(access), counts);
         }
         work.reads.iter().for_each(|line| memory.texture(*line, counts));
         for access in &work.colours {
-            memory.colour(access.line, access.write, is_cleared(access.line), counts);
+            memory.colour(access.line, access.write, is_cleared(access), counts);
         }
         let read = work.reads.iter().find(|line| !uses.may_read(**line));
         let depth = work.depths.iter().map(|access| access.line).find(|line| !uses.may_be_depth(*line));

@@ -289,8 +289,7 @@ impl ConservativePass {
             }
             let mut packet = gpu.packet(PacketKind::Tile, block, Some(numbers[primitive]));
             add(&tests, &mut packet.counts);
-            let written = &mut self.written;
-            gpu.access(&lanes, &mut packet.counts, |line| written.insert(line))?;
+            gpu.access(&lanes, &mut packet.counts, &mut self.written)?;
             gpu.push_block(&packet, &draw.tiles_of(block));
         }
         for (tile, output) in log.outputs {

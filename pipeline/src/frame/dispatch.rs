@@ -213,7 +213,7 @@ impl Gpu<'_> {
                 }
                 let tile = y0 / side * columns.len() as u32 + column;
                 let mut packet = self.packet(PacketKind::Tile, tile, None);
-                self.access(&work, &mut packet.counts, |line| written.insert(line))?;
+                self.access(&work, &mut packet.counts, written)?;
                 let of = [viewport.width(), viewport.height()];
                 let end = [(*x0 + side).min(of[0]), (y0 + side).min(of[1])];
                 self.push_block(&packet, &Block { first: [*x0, y0], end, of });

@@ -185,7 +185,8 @@ impl<'a> Replay<'a> {
         let used = work.read_pixels | work.written_pixels;
         self.lines(work.tile, used, SAMPLE_BYTES, |this, line, pixels| {
             let write = pixels & work.written_pixels != 0;
-            let fresh = !std::mem::replace(&mut this.depth_used[line as usize], true);
+            let fresh = !this.depth_used[line as usize];
+            this.depth_used[line as usize] |= write;
             this.memory.depth(base + line * LINE_BYTES, write, fresh, counts);
         });
         if !quads.is_empty() {
@@ -331,7 +332,7 @@ impl<'a> Replay<'a> {
                 }
             });
         }
-        if pass.depth.format.is_some() || pass.is_depth_only() {
+        if pass.depth.format.is_some() || !pass.is_attached {
             let plane = &pass.depth;
             self.lines(tile, pixels, plane.sample_bytes, |this, line, _| {
                 let address = plane.place.address() + line * LINE_BYTES;
