@@ -231,8 +231,8 @@ fn queried(row: &Cost, form: Form, rival_px: u32) -> Result<Queried, RunError> {
     let mut all = Vec::new();
     for kind in OcclusionBlur::ALL {
         for &samples in row.samples.get(form) {
-            let answered = |yard| {
-                let scene = Drawn::on(machine, [size.0, size.1], &kind.spec(asked, yard), samples)?;
+            let answered = |seed| {
+                let scene = Drawn::on(machine, [size.0, size.1], &kind.spec(asked, seed), samples)?;
                 let answered = scene.query(kind.typical(), tile_px)?;
                 Ok((scene, answered))
             };
