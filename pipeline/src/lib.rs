@@ -88,5 +88,5 @@ pub use memory::{CacheSpec, MemorySpec, Replacement};
 pub use sampling::{LensShape, SampleSpec, SampleTable};
 pub use shader::{Lane, Outputs, Shader, ShadingPoint};
 pub use state::{Blend, Clear, ColourState, Compare, DepthState, DrawState, Stencil, StencilFace, StencilOp};
-pub use surface::{Format, SurfaceSpec};
+pub use surface::{Format, Layout, SurfaceSpec};
 pub use texture::{Texture, TextureError, Wrap, linear_to_srgb8};

@@ -47,15 +47,6 @@ impl Gpu<'_> {
         self.reads.extend(self.uses.reads().iter().map(MemoryRange::address));
     }
 
-    /// Writes the clear value to a line of a target of the pass that was begun.
-    pub(super) fn clear_line(&mut self, line: u64, counts: &mut PacketCounts) {
-        if self.uses.may_be_depth(line) {
-            self.memory.depth(line, true, true, counts);
-        } else {
-            self.memory.colour(line, true, true, counts);
-        }
-    }
-
     /// Makes the accesses of lanes, for a packet with these counts. Lines of targets that are not in `written` have held
     /// nothing but the clear value so far.
     ///

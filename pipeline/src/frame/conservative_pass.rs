@@ -12,12 +12,12 @@ use rayon::prelude::*;
 use super::Gpu;
 use super::attachments::PassError;
 use super::heat::{Block, Placement};
-use super::lanes::{LaneWork, Lanes};
+use super::lanes::{LaneWork, Lanes, lines};
 use super::uses::Uses;
 use crate::conservative::{Grid, MovingTriangle, Rasterizer, TileLoop, Touch};
 use crate::depth::{Numbers, Real};
 use crate::geometry::{Projection, Viewport};
-use crate::memory::{LINE_BYTES, MemoryRange};
+use crate::memory::MemoryRange;
 use crate::setup::difference_madds;
 use crate::tally::{Costs, Kernel};
 
@@ -25,7 +25,6 @@ use crate::tally::{Costs, Kernel};
 const BATCH: usize = 32;
 /// Triangles whose tiles are in memory at once.
 const TRIANGLES_AT_ONCE: usize = 4096;
-
 /// Lines of a packet that stores what was cleared.
 const LINES_OF_PACKET: usize = 16;
 
@@ -262,16 +261,20 @@ impl ConservativePass {
 
     /// Stores a range of the targets, for later passes or for the host: lines that still hold the clear value are
     /// written.
-    pub fn store(&mut self, gpu: &mut Gpu<'_>, range: MemoryRange) {
+    ///
+    /// # Errors
+    /// [`PassError::Unstated`] if it is no target of the pass.
+    pub fn store(&mut self, gpu: &mut Gpu<'_>, range: MemoryRange) -> Result<(), PassError> {
         gpu.end_draws();
-        let lines = range.address() / LINE_BYTES..(range.address() + range.bytes()).div_ceil(LINE_BYTES);
-        let lines: Vec<u64> =
-            lines.map(|line| line * LINE_BYTES).filter(|line| self.written.insert(*line)).collect();
-        for (number, lines) in (0..).zip(lines.chunks(LINES_OF_PACKET)) {
+        let is_cleared = |line: &u64| !self.written.contains(line);
+        let cleared: Vec<u64> = lines(range.address(), range.bytes()).filter(is_cleared).collect();
+        for (number, lines) in (0..).zip(cleared.chunks(LINES_OF_PACKET)) {
             let mut packet = gpu.packet(PacketKind::Resolve, number, None);
-            lines.iter().for_each(|line| gpu.clear_line(*line, &mut packet.counts));
+            let work = LaneWork::writing(lines, gpu.uses.may_be_depth(lines[0]));
+            gpu.access(&work, &mut packet.counts, &mut self.written)?;
             gpu.push(&packet, 0);
         }
+        Ok(())
     }
 
     /// Emits the packets of a body, one for each triangle and block of tiles.

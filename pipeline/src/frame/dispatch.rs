@@ -16,6 +16,7 @@ use crate::buffer::{Access, Buffer, BufferBinding, Stored, Word};
 use crate::compute::{self, ComputeError, ComputePass, ComputeSpec, GroupLog, SurfaceView, Touched};
 use crate::geometry::Viewport;
 use crate::memory::{LINE_BYTES, MemorySystem};
+use crate::surface::{Format, Layout, SurfaceSpec};
 
 /// Groups that run before their packets are emitted.
 const CHUNK: u64 = 1024;
@@ -154,15 +155,16 @@ impl Gpu<'_> {
         uses: Uses,
         pixel: impl Fn(&Lanes, [u32; 2]) -> Vec3 + Sync,
     ) -> Result<Rendered, PassError> {
-        let tiles = Tiles { viewport, side: self.spec().tile_px };
-        let image = self.allocate(tiles.count() * tiles.pixels() * PIXEL_BYTES);
+        let spec = SurfaceSpec::new(name, viewport, Format::Rgba8Srgb);
+        let image = self.allocate(Layout::new(&spec, self.spec().tile_px, 0).1);
+        let layout = Layout::new(&spec, self.spec().tile_px, image.address()).0;
         let uses = uses.colours([image]);
         self.check_uses(name, &uses)?;
         self.open(name, Some(viewport));
         self.use_memory(uses);
         let colours = self.run_pixels(viewport, &mut HashSet::new(), |lanes, at| {
             let colour = pixel(lanes, at);
-            lanes.write(image, tiles.place(at) * PIXEL_BYTES, PIXEL_BYTES);
+            lanes.write(image, layout.at(at, 0) - image.address(), layout.bytes);
             colour
         })?;
         self.keep(image);
@@ -255,31 +257,6 @@ impl Gpu<'_> {
             triangle: triangle.unwrap_or(Packet::NONE),
             ..Packet::new(kind, self.last_pass())
         }
-    }
-}
-
-/// Tiles of `side` pixels along a side, in rows.
-#[derive(Clone, Copy)]
-struct Tiles {
-    viewport: Viewport,
-    side: u32,
-}
-
-impl Tiles {
-    fn count(self) -> u64 {
-        let of = |size: u32| u64::from(size.div_ceil(self.side));
-        of(self.viewport.width()) * of(self.viewport.height())
-    }
-
-    /// Pixels of a tile.
-    fn pixels(self) -> u64 {
-        u64::from(self.side).pow(2)
-    }
-
-    /// Place of a pixel in memory, in pixels.
-    fn place(self, [x, y]: [u32; 2]) -> u64 {
-        let tile = u64::from(y / self.side * self.viewport.width().div_ceil(self.side) + x / self.side);
-        tile * self.pixels() + u64::from(y % self.side * self.side + x % self.side)
     }
 }
 

@@ -103,6 +103,7 @@ pub struct PassReport {
     /// Events of each draw; those of a dispatch of groups are one.
     pub draws: Vec<Counts>,
     /// Number of draws whose events are among the others, as [`Self::forget_draws`] was called.
+    #[serde(default)]
     pub forgotten_draws: usize,
     /// Events of no single draw: resolving, and the barrier before the pass.
     pub others: Counts,

@@ -41,8 +41,8 @@ pub(super) struct TargetLine {
     pub write: bool,
 }
 
-/// Lines of a range.
-fn lines(address: u64, bytes: u64) -> impl Iterator<Item = u64> {
+/// Addresses of the lines of a range.
+pub(super) fn lines(address: u64, bytes: u64) -> impl Iterator<Item = u64> {
     let last = address + bytes.max(1) - 1;
     (address / LINE_BYTES..=last / LINE_BYTES).map(|line| line * LINE_BYTES)
 }
@@ -333,4 +333,13 @@ pub(super) struct LaneWork {
     pub depths: Vec<TargetLine>,
     /// Lines that the colour unit accesses.
     pub colours: Vec<TargetLine>,
+}
+
+impl LaneWork {
+    /// Writes these lines through the depth unit, or through the colour unit.
+    pub fn writing(lines: &[u64], is_depth: bool) -> Self {
+        let lines = lines.iter().map(|&line| TargetLine { line, write: true }).collect();
+        let (depths, colours) = if is_depth { (lines, Vec::new()) } else { (Vec::new(), lines) };
+        Self { depths, colours, ..Self::default() }
+    }
 }

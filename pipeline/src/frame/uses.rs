@@ -54,9 +54,8 @@ impl Uses {
 
     /// What the units of depth and colour access.
     pub(super) fn targets(&self) -> impl Iterator<Item = (MemoryRange, Writer)> {
-        let of =
-            |ranges: &[MemoryRange], by| ranges.iter().map(move |range| (*range, by)).collect::<Vec<_>>();
-        of(&self.depths, Writer::Depth).into_iter().chain(of(&self.colours, Writer::Colour))
+        let depths = self.depths.iter().map(|range| (*range, Writer::Depth));
+        depths.chain(self.colours.iter().map(|range| (*range, Writer::Colour)))
     }
 
     /// Whether the texture unit may read a line.

@@ -188,7 +188,7 @@ impl Texels {
 
 /// Addresses of the samples of a surface: tile by tile, pixel by pixel in rows of the tile.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Layout {
+pub struct Layout {
     /// First byte.
     pub address: u64,
     /// Side of a tile in pixels.

@@ -13,6 +13,14 @@ use pipeline::*;
 
 const GRID: Grid = Grid { origin: [0.0, 0.0], tile: [1.0; 2], columns: 8, rows: 8 };
 
+/// A triangle that touches seven tiles.
+const CORNERS: [[f64; 3]; 3] = [[0.5, 0.5, 2.0], [3.5, 0.5, 2.0], [0.5, 1.5, 4.0]];
+
+/// A draw in blocks of 8 x 8 tiles.
+fn in_blocks_of_8(primitives: &[Primitive], vertices: MemoryRange) -> ConservativeDraw<'_> {
+    ConservativeDraw { primitives, grid: &GRID, block: 8, vertices, vertex_bytes: 24, projection: None }
+}
+
 fn primitive(corners: [[[f64; 3]; 3]; 2], body: u32) -> Primitive {
     Primitive {
         triangle: MovingTriangle::new(corners[0], corners[1]).unwrap(),
@@ -71,7 +79,7 @@ fn drawn(primitives: &[Primitive], block: u32) -> (Vec<Tile>, Vec<PacketKind>, C
 
 #[test]
 fn a_still_triangle_is_counted_by_hand() {
-    let corners = [[0.5, 0.5, 2.0], [3.5, 0.5, 2.0], [0.5, 1.5, 4.0]];
+    let corners = CORNERS;
     let (found, kinds, counts) = drawn(&[primitive([corners; 2], 0)], 8);
     // As in the example of `pipeline::conservative`.
     assert_eq!(found.len(), 7);
@@ -111,7 +119,7 @@ fn a_moving_triangle_counts_the_differences_of_its_vertices_once() {
 
 #[test]
 fn set_up_drops_front_faces_where_only_backs_are_drawn() {
-    let corners = [[0.5, 0.5, 2.0], [3.5, 0.5, 2.0], [0.5, 1.5, 4.0]];
+    let corners = CORNERS;
     let back = Primitive { keeps_back_faces_only: true, ..primitive([corners; 2], 0) };
     let [a, b, c] = corners;
     let front = Primitive { keeps_back_faces_only: true, ..primitive([[a, c, b]; 2], 1) };
@@ -226,7 +234,7 @@ fn lanes_of_a_full_screen_pass_wait_for_their_warp() {
     assert_eq!(turns.unwrap().counts[Event::ShaderOps], 4 * 5 + 4 * 7);
     // Quads that run nothing are not started.
     assert_eq!(counts(|[x, _]| if x < 3 { vec![2] } else { vec![] }), [2 * 4 * 4, 8, 2 * 32]);
-    let corners = [[0.5, 0.5, 2.0], [3.5, 0.5, 2.0], [0.5, 1.5, 4.0]];
+    let corners = CORNERS;
     let (found, _, counts) = drawn(&[primitive([corners; 2], 0)], 8);
     assert_eq!(counts[Event::PixelInvocations], found.len() as u64);
     assert_eq!(counts[Event::HelperInvocations], 0);
@@ -327,16 +335,8 @@ fn stored_targets_are_written_whole() {
     let spec = spec(Features::ALL);
     let mut gpu = Gpu::without_packets(&spec).unwrap();
     let [target, vertices] = [64 * 64, 72].map(|bytes| gpu.allocate(bytes));
-    let corners = [[0.5, 0.5, 2.0], [3.5, 0.5, 2.0], [0.5, 1.5, 4.0]];
-    let primitives = [primitive([corners; 2], 0)];
-    let draw = ConservativeDraw {
-        primitives: &primitives,
-        grid: &GRID,
-        block: 8,
-        vertices,
-        vertex_bytes: 24,
-        projection: None,
-    };
+    let primitives = [primitive([CORNERS; 2], 0)];
+    let draw = in_blocks_of_8(&primitives, vertices);
     let shader = Merge { target, runs: AtomicU32::new(0) };
     let mut pass = gpu.begin_conservative("boxes", None, Uses::default().depths([target])).unwrap();
     pass.draw(&mut gpu, &draw, &shader, |_, _| ()).unwrap();
@@ -348,9 +348,9 @@ fn stored_targets_are_written_whole() {
     assert_eq!(read.map(|values| values.len()), Ok(64));
     assert_eq!(reads(&gpu), before, "cleared lines are not fetched");
     let lines = gpu.counts_of_pass()[Event::DepthLines];
-    pass.store(&mut gpu, target);
+    pass.store(&mut gpu, target).unwrap();
     assert_eq!(gpu.counts_of_pass()[Event::DepthLines] - lines, 63, "all lines but that of the triangle");
-    pass.store(&mut gpu, target);
+    pass.store(&mut gpu, target).unwrap();
     assert_eq!(gpu.counts_of_pass()[Event::DepthLines] - lines, 63);
     gpu.keep(target);
     assert_eq!(gpu.finish().counts()[Event::DramWriteBytes], 64 * 64);
@@ -368,16 +368,8 @@ fn written_vertices_are_waited_for() {
     })
     .unwrap();
     let [target, vertices] = [64 * 4, 72].map(|bytes| gpu.allocate(bytes));
-    let corners = [[0.5, 0.5, 2.0], [3.5, 0.5, 2.0], [0.5, 1.5, 4.0]];
-    let primitives = [primitive([corners; 2], 0)];
-    let draw = ConservativeDraw {
-        primitives: &primitives,
-        grid: &GRID,
-        block: 8,
-        vertices,
-        vertex_bytes: 24,
-        projection: None,
-    };
+    let primitives = [primitive([CORNERS; 2], 0)];
+    let draw = in_blocks_of_8(&primitives, vertices);
     let shader = Merge { target, runs: AtomicU32::new(0) };
     gpu.begin_conservative("vertices", None, Uses::default().depths([vertices])).unwrap();
     let mut pass = gpu.begin_conservative("triangles", None, Uses::default().depths([target])).unwrap();
@@ -444,20 +436,13 @@ impl TileShader for TwoPrograms {
 /// Lanes of a packet share warps with those of their program alone, and wait for the longest.
 #[test]
 fn lanes_of_tiles_wait_for_those_of_their_program() {
-    let corners = [[0.5, 0.5, 2.0], [3.5, 0.5, 2.0], [0.5, 1.5, 4.0]];
+    let corners = CORNERS;
     let primitives = [primitive([corners; 2], 0)];
     let ops = |warp_lanes: u32| {
         let spec = PipelineSpec { warp_lanes, ..spec(Features::ALL) };
         let (mut gpu, mut tiles) = (Gpu::without_packets(&spec).unwrap(), Vec::new());
         let vertices = gpu.allocate(72);
-        let draw = ConservativeDraw {
-            primitives: &primitives,
-            grid: &GRID,
-            block: 8,
-            vertices,
-            vertex_bytes: 24,
-            projection: None,
-        };
+        let draw = in_blocks_of_8(&primitives, vertices);
         let mut pass = gpu.begin_conservative("two", None, Uses::default()).unwrap();
         pass.draw(&mut gpu, &draw, &TwoPrograms, |_, tile| tiles.push(tile)).unwrap();
         assert_eq!(tiles.len(), 7);
@@ -475,7 +460,7 @@ fn lanes_of_tiles_wait_for_those_of_their_program() {
 /// in its right half, the first row below.
 #[test]
 fn heat_maps_have_the_work_on_tiles_in_their_pixels() {
-    let corners = [[0.5, 0.5, 2.0], [3.5, 0.5, 2.0], [0.5, 1.5, 4.0]];
+    let corners = CORNERS;
     let primitives =
         [primitive([corners; 2], 0), primitive([corners.map(|[x, y, z]| [x + 3.0, y, z]); 2], 1)];
     let (spec, viewport) = (spec(Features::ALL), Viewport::new(40, 24).unwrap());

@@ -143,7 +143,7 @@ pub(super) fn draw_stored(
             picture.useful += u64::from(light > 0.0);
         }
     })?;
-    pass.store(gpu, region);
+    pass.store(gpu, region)?;
     Ok((picture, buffer))
 }
 

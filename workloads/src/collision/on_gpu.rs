@@ -116,8 +116,9 @@ impl<'a, 'e> PassesOnGpu<'a, 'e> {
 
     /// The answers of a pass are in memory when it ends, for the host to read.
     fn end_pass(&mut self) {
-        if std::mem::take(&mut self.answered) > 0 {
-            self.pass.store(self.gpu, self.answers);
+        if std::mem::take(&mut self.answered) > 0 && self.refused.is_none() {
+            let stored = self.pass.store(self.gpu, self.answers);
+            self.is_drawn(stored);
             self.gpu.keep(self.answers);
         }
     }

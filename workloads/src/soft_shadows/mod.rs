@@ -19,7 +19,9 @@ use activity::Counts;
 use glam::{DVec3, Vec3};
 use pipeline::memory::MemoryRange;
 use pipeline::sampling::Sample;
-use pipeline::{Camera, Draw, Gpu, Lane, Lens, RasterPass, Settings, Target, Viewport};
+use pipeline::{
+    Camera, Draw, Format, Gpu, Lane, Layout, Lens, RasterPass, Settings, SurfaceSpec, Target, Viewport,
+};
 use serde::{Deserialize, Serialize};
 
 use crate::accumulation::{SharedSamples, Snapshot};
@@ -162,8 +164,8 @@ pub struct ShadowMap {
     /// Event counts.
     pub counts: Counts,
     surfaces: Vec<MemoryRange>,
-    /// Side of a tile of the GPU that drew it: its depths lie tile by tile.
-    tile_px: u32,
+    /// Where the depths lie in each of them.
+    layouts: Vec<Layout>,
 }
 
 impl ShadowMap {
@@ -188,14 +190,11 @@ impl ShadowMap {
         let set = set.centred();
         let seen = depth_pass(&SceneView { camera: light.camera(), draws }, viewport, &set, method, gpu)?;
         let depths = seen.samples.into_iter().map(|(_, depth)| f32::from_bits(depth)).collect();
-        Ok(Self {
-            side,
-            set,
-            depths,
-            counts: seen.counts,
-            surfaces: seen.surfaces,
-            tile_px: gpu.spec().tile_px,
-        })
+        let samples = (set.samples().len() / seen.surfaces.len().max(1)) as u32;
+        let spec = SurfaceSpec::new("map", viewport, Format::D32).sampled(samples);
+        let layout = |region: &MemoryRange| Layout::new(&spec, gpu.spec().tile_px, region.address()).0;
+        let layouts = seen.surfaces.iter().map(layout).collect();
+        Ok(Self { side, set, depths, counts: seen.counts, surfaces: seen.surfaces, layouts })
     }
 
     /// Texels across and down.
@@ -226,15 +225,11 @@ impl ShadowMap {
     pub fn address(&self, place: usize) -> u64 {
         let count = self.set.samples().len();
         let (texel, index) = (place / count, place % count);
-        let [x, y] = [texel as u32 % self.side, texel as u32 / self.side];
-        let (tile_px, side) = (self.tile_px, self.side.div_ceil(self.tile_px));
-        let tile = u64::from(y / tile_px * side + x / tile_px);
-        let texel = tile * u64::from(tile_px.pow(2)) + u64::from(y % tile_px * tile_px + x % tile_px);
-        let (surface, at) = match &self.surfaces[..] {
-            [all] => (all, texel * count as u64 + index as u64),
-            each => (&each[index], texel),
-        };
-        surface.address() + at * DEPTH_BYTES
+        let pixel = [texel as u32 % self.side, texel as u32 / self.side];
+        match &self.layouts[..] {
+            [all] => all.at(pixel, index as u32),
+            each => each[index].at(pixel, 0),
+        }
     }
 
     /// Where the depths are in memory.

@@ -274,9 +274,9 @@ impl Study for CcdChart {
         to.chart("ccd_failures", [title, subject], vec![self.failures()])?;
         let title = "What narrowing gains on the GPU";
         let subject = format!(
-            "quintile run ccd, {} balls, 8 pixels across and more: two sweeps over all objects along each axis, as in the paper, and pairs narrowed by the CPU \
+            "quintile run ccd, {} balls, {} pixels across and more: two sweeps over all objects along each axis, as in the paper, and pairs narrowed by the CPU \
              from axis to axis",
-            self.effort.balls
+            self.effort.balls, self.effort.resolutions[0]
         );
         to.chart("ccd_narrowing", [title, &subject], self.gains())
     }
