@@ -92,6 +92,12 @@ pub(crate) enum Kernel {
     Inside,
     /// The times of a point in a moving triangle.
     Times,
+    /// The planes of a triangle at the ends of the shutter.
+    Planes,
+    /// The depths of a triangle over a tile.
+    Depths,
+    /// The same in conservative mode.
+    ExactDepths,
 }
 
 /// Multiply-adds of the paths that were taken so far, each with its branches. By default none is remembered,
@@ -103,6 +109,13 @@ impl Costs {
     /// Room for 4096 paths; of two in one place the later stays.
     pub fn remembered() -> Self {
         Self(vec![Cell::default(); 4096].into())
+    }
+
+    /// Makes room if there is none.
+    pub(crate) fn remember(&mut self) {
+        if self.0.is_empty() {
+            *self = Self::remembered();
+        }
     }
 
     /// Runs a kernel: `follow` on plain numbers, and `count` if the path is new. Returns the result with its

@@ -3,7 +3,8 @@
 use std::ops::{AddAssign, Range};
 
 use super::{MovingTriangle, Precision, Rect, Region, Rounded, Touch, View, recentring_madds};
-use crate::depth::{DepthBound, ExactBounder, exact_interval_madds, set_up_madds};
+use crate::depth::ExactBounder;
+use crate::tally::Costs;
 use crate::traversal::{
     Box5, EdgeBounds, Edges, TileRect, TileView as Seen, edge_bound_madds, edge_madds, narrow_by_sides,
     narrow_near,
@@ -124,36 +125,48 @@ impl Rasterizer {
         part: [Range<u32>; 2],
         mut each: impl FnMut([u32; 2], &Touch),
     ) {
-        self.rasterize_counted(triangle, grid, part, |tile, touch, _| each(tile, touch));
+        self.in_precision(triangle, (grid, part), None, &mut |tile, touch, _| each(tile, touch));
     }
 
-    /// The same with the work of the tile loop. `each` is given the work since its last call and may take it;
-    /// the rest is returned.
+    /// The same with the work of the tile loop, whose multiply-adds `costs` counts. `each` is given the work since its
+    /// last call and may take it; the rest is returned.
     pub fn rasterize_counted(
         &self,
         triangle: &MovingTriangle,
         grid: &Grid,
         part: [Range<u32>; 2],
+        costs: &Costs,
         mut each: impl FnMut([u32; 2], &Touch, &mut TileLoop),
     ) -> TileLoop {
+        self.in_precision(triangle, (grid, part), Some(costs), &mut each)
+    }
+
+    fn in_precision(
+        &self,
+        triangle: &MovingTriangle,
+        part: (&Grid, [Range<u32>; 2]),
+        costs: Option<&Costs>,
+        each: Each<'_>,
+    ) -> TileLoop {
         if self.in_doubles {
-            self.tiles::<f64>(triangle, grid, part, &mut each)
+            self.tiles::<f64>(triangle, part, costs, each)
         } else {
-            self.tiles::<f32>(triangle, grid, part, &mut each)
+            self.tiles::<f32>(triangle, part, costs, each)
         }
     }
 
     fn tiles<C: Precision>(
         &self,
         triangle: &MovingTriangle,
-        grid: &Grid,
-        [columns, rows]: [Range<u32>; 2],
+        (grid, [columns, rows]): (&Grid, [Range<u32>; 2]),
+        costs: Option<&Costs>,
         each: Each<'_>,
     ) -> TileLoop {
         if columns.is_empty() || rows.is_empty() {
             return TileLoop::default();
         }
-        let mut tests = Tests::<C>::new(self, triangle, &grid.rect(&columns, &rows), &self.clip);
+        let rect = grid.rect(&columns, &rows);
+        let mut tests = Tests::<C>::new(self, triangle, &rect, costs);
         let within = self.clip.outward(self.view.has_lens());
         tests.descend(grid, [columns, rows], within, each);
         tests.work
@@ -174,28 +187,28 @@ enum Culled {
 /// The tests of one triangle, and their work.
 struct Tests<'a, C> {
     rasterizer: &'a Rasterizer,
-    region: &'a Region,
     rounded: Rounded<C>,
-    bounder: ExactBounder,
+    /// Finds depths, if any are.
+    bounder: Option<ExactBounder>,
+    costs: Option<&'a Costs>,
     work: TileLoop,
 }
 
 impl<'a, C: Precision> Tests<'a, C> {
     /// Tests of tiles within `rect`.
-    fn new(rasterizer: &'a Rasterizer, triangle: &MovingTriangle, rect: &Rect, region: &'a Region) -> Self {
+    fn new(
+        rasterizer: &'a Rasterizer,
+        triangle: &MovingTriangle,
+        rect: &Rect,
+        costs: Option<&'a Costs>,
+    ) -> Self {
         let rounded = Rounded::<C>::new(&rasterizer.view, triangle, rect);
-        let moving = rounded.triangle.moving;
-        let work = TileLoop {
-            place_madds: recentring_madds(moving, rasterizer.view.is_perspective()),
-            depth_madds: if rasterizer.finds_depths {
-                set_up_madds(DepthBound::LocalPlanes, moving)
-            } else {
-                0
-            },
-            ..TileLoop::default()
-        };
-        let bounder = ExactBounder::new(&rounded.triangle, &rounded.shear);
-        Self { rasterizer, region, rounded, bounder, work }
+        let place_madds = recentring_madds(rounded.triangle.moving, rasterizer.view.is_perspective());
+        let bounder = || ExactBounder::new(&rounded.triangle, &rounded.shear, costs);
+        let (bounder, depth_madds) = rasterizer.finds_depths.then(bounder).unzip();
+        let depth_madds = depth_madds.unwrap_or(0);
+        let work = TileLoop { place_madds, depth_madds, ..TileLoop::default() };
+        Self { rasterizer, rounded, bounder, costs, work }
     }
 
     fn descend(
@@ -300,12 +313,13 @@ impl<'a, C: Precision> Tests<'a, C> {
     fn depths(&mut self, tile: &TileRect<C>, within: &Box5<C>) -> Option<Touch> {
         let near = self.rasterizer.view.near();
         let mut z = [near, f64::INFINITY];
-        if self.rasterizer.finds_depths {
-            self.work.depth_madds += exact_interval_madds(self.rounded.triangle.moving, within.lens);
-            let [lo, hi] = self.rounded.depths(self.bounder.over(tile, within, self.rounded.depth_slack));
+        if let Some(bounder) = &self.bounder {
+            let (depths, madds) = bounder.over(tile, within, self.rounded.depth_slack, self.costs);
+            self.work.depth_madds += madds;
+            let [lo, hi] = self.rounded.depths(depths);
             z = [lo.max(near), hi];
         }
-        let Region { u, v, t } = self.region.within(within);
+        let Region { u, v, t } = self.rasterizer.clip.within(within);
         [u, v, t, z].iter().all(|[lo, hi]| lo <= hi).then_some(Touch { u, v, t, z })
     }
 }

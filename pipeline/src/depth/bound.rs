@@ -3,9 +3,12 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{LensRays, MovingPlane, Points, Real, both, cross, hull, normal, range, sides, tightest};
+use super::{
+    LensRays, MovingPlane, Numbers, Points, Real, both, cross, hull, normal, range, sides, tightest,
+};
 use crate::geometry::Shear;
 use crate::setup::Triangle;
+use crate::tally::{Branches, Costs, Kernel};
 use crate::traversal::{Box5, Coordinate, TileRect};
 
 /// Method of bounding the depth of a triangle over a tile. Each method includes the bounds of the methods
@@ -27,14 +30,14 @@ impl DepthBound {
     /// All methods, the coarsest first.
     pub const ALL: [Self; 4] = [Self::Vertices, Self::VerticesInTime, Self::Planes, Self::LocalPlanes];
 
-    fn has_planes(self) -> bool {
+    pub(crate) fn has_planes(self) -> bool {
         self >= Self::Planes
     }
 }
 
-/// Multiply-adds of [`Bounder::new`], counted from the code by a test with counting numbers. A still triangle
-/// has one plane, a moving one two. Methods that find their planes in every tile have none here.
-pub const fn set_up_madds(bound: DepthBound, moving: bool) -> u32 {
+/// Multiply-adds of preparing a triangle. A still one has one plane, a moving one two. Methods that find their planes
+/// in every tile have none here. The choice of tests expects them before the work is done.
+pub(crate) const fn set_up_madds(bound: DepthBound, moving: bool) -> u32 {
     match (bound, moving) {
         (DepthBound::Vertices | DepthBound::VerticesInTime, _) | (DepthBound::LocalPlanes, true) => 0,
         (DepthBound::Planes | DepthBound::LocalPlanes, false) => 25,
@@ -42,30 +45,23 @@ pub const fn set_up_madds(bound: DepthBound, moving: bool) -> u32 {
     }
 }
 
-/// Multiply-adds of one [`Bounder::over`], counted likewise, if every plane gives a bound. Rounding
-/// allowances are included.
-pub const fn interval_madds(bound: DepthBound, moving: bool, lens: bool) -> u32 {
+/// Multiply-adds of one interval, if every plane gives a bound: expected likewise.
+pub(crate) const fn interval_madds(bound: DepthBound, moving: bool, lens: bool) -> u32 {
     match (bound, moving, lens) {
-        (DepthBound::VerticesInTime, true, _) => 6,
-        (DepthBound::Vertices | DepthBound::VerticesInTime, ..) => 0,
-        (_, false, false) => 90,
-        (_, false, true) => 172,
-        (DepthBound::Planes, true, false) => 220,
-        (DepthBound::Planes, true, true) => 368,
-        (DepthBound::LocalPlanes, true, false) => 272,
-        (DepthBound::LocalPlanes, true, true) => 420,
+        (DepthBound::Vertices | DepthBound::VerticesInTime, ..) => vertex_madds(bound, moving),
+        (_, false, false) => 86,
+        (_, false, true) => 158,
+        (DepthBound::Planes, true, false) => 208,
+        (DepthBound::Planes, true, true) => 340,
+        (DepthBound::LocalPlanes, true, false) => 260,
+        (DepthBound::LocalPlanes, true, true) => 392,
     }
 }
 
-/// Multiply-adds of one interval of a triangle in conservative mode, by [`DepthBound::LocalPlanes`]: counted
-/// likewise.
-pub(crate) const fn exact_interval_madds(moving: bool, lens: bool) -> u32 {
-    match (moving, lens) {
-        (false, false) => 32,
-        (false, true) => 114,
-        (true, false) => 144,
-        (true, true) => 292,
-    }
+/// Multiply-adds of the depths of the vertices at the ends of a time interval. Methods with planes have them from the
+/// vertices of their planes.
+const fn vertex_madds(bound: DepthBound, moving: bool) -> u32 {
+    if matches!(bound, DepthBound::VerticesInTime) && moving { 6 } else { 0 }
 }
 
 /// Smallest and largest depth of the vertices of `triangle` for times in `t`. The depth at a sample is a
@@ -83,55 +79,97 @@ pub struct Bounder {
     bound: DepthBound,
     /// Input of the plane bounds, for methods with planes.
     facts: Option<Facts<f64>>,
-    /// Planes through the triangle at the ends of the shutter, for methods that find them in set-up.
-    shutter: Option<[MovingPlane<f64>; 2]>,
 }
 
 impl Bounder {
     /// Prepare depth bounds of `triangle` under a lens with `shear`.
     pub fn new(triangle: &Triangle, shear: &Shear, bound: DepthBound) -> Self {
+        Self::counted(triangle, shear, bound, None).0
+    }
+
+    /// The same with the multiply-adds, if there are `costs` to count them with, else 0.
+    pub(crate) fn counted(
+        triangle: &Triangle,
+        shear: &Shear,
+        bound: DepthBound,
+        costs: Option<&Costs>,
+    ) -> (Self, u32) {
         let facts = bound.has_planes().then(|| Facts::new(triangle, shear));
         let early = bound == DepthBound::Planes || (bound == DepthBound::LocalPlanes && !triangle.moving);
-        let shutter = facts.as_ref().filter(|_| early).map(Facts::shutter);
-        Self { triangle: *triangle, bound, facts, shutter }
+        let facts = facts.map(|facts| if early { facts.prepared(costs) } else { (facts, 0) });
+        let madds = facts.map_or(0, |(_, madds)| madds);
+        (Self { triangle: *triangle, bound, facts: facts.map(|(facts, _)| facts) }, madds)
     }
 
     /// Interval of the depths of all samples in `tile` and `within` for which
     /// [`test_run`](crate::sample_test::test_run) finds the triangle visible.
     pub fn over(&self, tile: &TileRect, within: &Box5) -> [f32; 2] {
+        self.over_counted(tile, within, None).0
+    }
+
+    /// The same with the multiply-adds, if there are `costs` to count them with, else 0.
+    #[inline]
+    pub(crate) fn over_counted(
+        &self,
+        tile: &TileRect,
+        within: &Box5,
+        costs: Option<&Costs>,
+    ) -> ([f32; 2], u32) {
         let t = if self.bound == DepthBound::Vertices { [0.0, 1.0] } else { within.t };
         let vertices = vertex_range(&self.triangle, t);
-        let Some(facts) = &self.facts else { return vertices };
-        match facts.over(self.shutter.as_ref(), &Region::new(tile, within)) {
-            Some([lo, hi]) => both(vertices, [f32::at_most(lo), f32::at_least(hi)]),
-            None => vertices,
-        }
+        let Some(facts) = &self.facts else {
+            return (vertices, costs.map_or(0, |_| vertex_madds(self.bound, self.triangle.moving)));
+        };
+        let region = Region::new(tile, within);
+        let (depths, madds) = match costs {
+            None => (facts.over((), &region), 0),
+            Some(costs) => costs.run(
+                Kernel::Depths,
+                |path| facts.over(path, &region),
+                |tally| _ = facts.on(tally).over(tally, &region.on(tally)),
+            ),
+        };
+        (depths.map_or(vertices, |[lo, hi]| both(vertices, [f32::at_most(lo), f32::at_least(hi)])), madds)
     }
 }
 
 /// Depth bounds of a triangle in conservative mode, by [`DepthBound::LocalPlanes`].
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct ExactBounder {
-    facts: Facts<f64>,
-    /// The plane of a still triangle.
-    shutter: Option<[MovingPlane<f64>; 2]>,
-}
+pub(crate) struct ExactBounder(Facts<f64>);
 
 impl ExactBounder {
-    /// Prepare depth bounds of `triangle` under a lens with `shear`.
-    pub fn new<C: Coordinate>(triangle: &Triangle<C>, shear: &Shear<C>) -> Self {
+    /// Prepare depth bounds of `triangle` under a lens with `shear`; with the multiply-adds, if there are `costs` to
+    /// count them with, else 0.
+    pub fn new<C: Coordinate>(
+        triangle: &Triangle<C>,
+        shear: &Shear<C>,
+        costs: Option<&Costs>,
+    ) -> (Self, u32) {
         let facts = Facts::new(triangle, shear);
-        let shutter = (!triangle.moving).then(|| facts.shutter());
-        Self { facts, shutter }
+        let (facts, madds) = if triangle.moving { (facts, 0) } else { facts.prepared(costs) };
+        (Self(facts), madds)
     }
 
     /// Interval of the depths of all points seen in `tile` and `within` of a triangle whose vertices are off
-    /// by half the slack, and by `depth` in depth. It is empty if there are none.
-    pub fn over<C: Coordinate>(&self, tile: &TileRect<C>, within: &Box5<C>, depth: C) -> [C; 2] {
+    /// by half the slack, and by `depth` in depth. It is empty if there are none. With the multiply-adds likewise.
+    pub fn over<C: Coordinate>(
+        &self,
+        tile: &TileRect<C>,
+        within: &Box5<C>,
+        depth: C,
+        costs: Option<&Costs>,
+    ) -> ([C; 2], u32) {
         // Twice the error covers the rounding of vertices at a time, and of the bound.
-        let [lo, hi] =
-            self.facts.exact(self.shutter.as_ref(), &Region::new(tile, within), 2.0 * depth.into());
-        [C::at_most(lo), C::at_least(hi)]
+        let (facts, region, off) = (&self.0, Region::new(tile, within), 2.0 * depth.into());
+        let ([lo, hi], madds) = match costs {
+            None => (facts.exact((), &region, off), 0),
+            Some(costs) => costs.run(
+                Kernel::ExactDepths,
+                |path| facts.exact(path, &region, off),
+                |tally| _ = facts.on(tally).exact(tally, &region.on(tally), tally.number(off)),
+            ),
+        };
+        ([C::at_most(lo), C::at_least(hi)], madds)
     }
 }
 
@@ -151,6 +189,15 @@ impl Region<f64> {
             t: wide(within.t),
         }
     }
+
+    fn on<N: Numbers>(&self, numbers: N) -> Region<N::Number> {
+        let number = |value| numbers.number(value);
+        Region {
+            tile: self.tile.map(|range| range.map(number)),
+            lens: self.lens.map(|lens| lens.map(|range| range.map(number))),
+            t: self.t.map(number),
+        }
+    }
 }
 
 /// A triangle under a lens, after set-up.
@@ -165,6 +212,8 @@ struct Facts<R> {
     s: [R; 2],
     a: [R; 2],
     parallel: bool,
+    /// Planes through the triangle at the ends of the shutter, if they are found in set-up.
+    shutter: Option<[MovingPlane<R>; 2]>,
 }
 
 impl Facts<f64> {
@@ -176,7 +225,35 @@ impl Facts<f64> {
             |axis: usize| (0..3).map(|k| open[k][axis].abs() + delta[k][axis].abs()).fold(0.0, f64::max);
         let size = [largest(0) + s[0].abs(), largest(1) + s[1].abs(), largest(2)];
         let (moving, slack, parallel) = (triangle.moving, triangle.slack.map(Into::into), shear.parallel);
-        Self { open, delta, moving, size, slack, s, a, parallel }
+        Self { open, delta, moving, size, slack, s, a, parallel, shutter: None }
+    }
+
+    /// With the planes at the ends of the shutter, and their multiply-adds if there are `costs` to count them with.
+    fn prepared(self, costs: Option<&Costs>) -> (Self, u32) {
+        let (planes, madds) = match costs {
+            None => (self.planes_of_shutter(()), 0),
+            Some(costs) => costs.run(
+                Kernel::Planes,
+                |path| self.planes_of_shutter(path),
+                |tally| _ = self.on(tally).planes_of_shutter(tally),
+            ),
+        };
+        (Self { shutter: Some(planes), ..self }, madds)
+    }
+
+    fn on<N: Numbers>(&self, numbers: N) -> Facts<N::Number> {
+        let number = |value| numbers.number(value);
+        Facts {
+            open: self.open.map(|point| point.map(number)),
+            delta: self.delta.map(|point| point.map(number)),
+            moving: self.moving,
+            size: self.size.map(number),
+            slack: self.slack.map(number),
+            s: self.s.map(number),
+            a: self.a.map(number),
+            parallel: self.parallel,
+            shutter: self.shutter.map(|planes| planes.map(|plane| plane.on(numbers))),
+        }
     }
 }
 
@@ -192,8 +269,8 @@ impl<R: Real> Facts<R> {
     }
 
     /// Planes through the triangle at each end of the shutter; equal for a still triangle.
-    fn shutter(&self) -> [MovingPlane<R>; 2] {
-        if !self.moving {
+    fn planes_of_shutter(&self, path: impl Branches) -> [MovingPlane<R>; 2] {
+        if !path.branch(self.moving) {
             return [MovingPlane::still(normal(&self.open), &self.open, self.size); 2];
         }
         let close = [0, 1, 2].map(|k| [0, 1, 2].map(|axis| self.open[k][axis] + self.delta[k][axis]));
@@ -207,25 +284,27 @@ impl<R: Real> Facts<R> {
 
     /// Depths allowed by the planes of set-up or, without these, by planes through the triangle at the ends
     /// of the region's time. The interval includes the rounding of the sample test.
-    fn over(&self, shutter: Option<&[MovingPlane<R>; 2]>, region: &Region<R>) -> Option<[R; 2]> {
-        let (beam, ends) = (self.beam(region), self.ends(region));
-        let margin = margin(&ends[..self.different()], &beam, self.slack, self.size[2])?;
-        self.planes(shutter, region, &beam, &ends, &margin)
+    fn over(&self, path: impl Branches, region: &Region<R>) -> Option<[R; 2]> {
+        let (beam, ends) = (self.beam(path, region), self.ends(path, region));
+        let margin = margin(&ends[..self.different()], &beam, self.slack, self.size[2]);
+        path.branch(margin.is_some());
+        self.planes(path, region, &beam, &ends, &margin?)
     }
 
     /// Depths of every point of a triangle whose vertices are off by half the slack, and by `depth` in depth.
-    fn exact(&self, shutter: Option<&[MovingPlane<R>; 2]>, region: &Region<R>, depth: R) -> [R; 2] {
+    fn exact(&self, path: impl Branches, region: &Region<R>, depth: R) -> [R; 2] {
         let margin = Margin { off: self.slack.map(|slack| R::new(0.5) * slack), depth };
-        let ends = self.ends(region);
+        let (beam, ends) = (self.beam(path, region), self.ends(path, region));
         let depths = |points: &Points<R>| range([points[0][2], points[1][2], points[2][2]]);
         let [lo, hi] = hull(depths(&ends[0]), depths(&ends[1]));
         let vertices = [lo - depth, hi + depth];
-        let planes = self.planes(shutter, region, &self.beam(region), &ends, &margin);
+        let planes = self.planes(path, region, &beam, &ends, &margin);
         planes.map_or(vertices, |planes| both(vertices, planes))
     }
 
-    fn beam(&self, region: &Region<R>) -> LensRays<R> {
-        match (region.lens, self.parallel) {
+    fn beam(&self, path: impl Branches, region: &Region<R>) -> LensRays<R> {
+        path.branch(region.lens.is_some());
+        match (region.lens, path.branch(self.parallel)) {
             (Some(lens), false) => LensRays::lens(region.tile, lens, self.s, self.a),
             (None, false) => LensRays::pinhole(region.tile),
             (Some(lens), true) => LensRays::oblique(region.tile, lens, self.s, self.a),
@@ -234,8 +313,8 @@ impl<R: Real> Facts<R> {
     }
 
     /// Vertices at the ends of the time.
-    fn ends(&self, region: &Region<R>) -> [Points<R>; 2] {
-        if self.moving { [self.at(region.t[0]), self.at(region.t[1])] } else { [self.open; 2] }
+    fn ends(&self, path: impl Branches, region: &Region<R>) -> [Points<R>; 2] {
+        if path.branch(self.moving) { [self.at(region.t[0]), self.at(region.t[1])] } else { [self.open; 2] }
     }
 
     fn different(&self) -> usize {
@@ -244,16 +323,17 @@ impl<R: Real> Facts<R> {
 
     fn planes(
         &self,
-        shutter: Option<&[MovingPlane<R>; 2]>,
+        path: impl Branches,
         region: &Region<R>,
         beam: &LensRays<R>,
         ends: &[Points<R>; 2],
         margin: &Margin<R>,
     ) -> Option<[R; 2]> {
-        let planes = shutter.copied().unwrap_or_else(|| self.through(ends));
+        let known = path.branch(self.shutter.is_some());
+        let planes = self.shutter.unwrap_or_else(|| self.through(ends));
         let bounds = planes[..self.different()].iter().map(|plane| {
-            let reach = if shutter.is_some() && self.moving { plane.within(region.t) } else { plane.whole() };
-            plane.depths(reach, beam, margin.off)
+            let reach = if known && self.moving { plane.within(region.t) } else { plane.whole() };
+            plane.depths(path, reach, beam, margin.off)
         });
         tightest(bounds).map(|[lo, hi]| [lo - margin.depth, hi + margin.depth])
     }
@@ -345,7 +425,6 @@ fn seen_area<R: Real>(ends: &[Points<R>], slopes: &[[R; 2]; 2]) -> R {
 
 #[cfg(test)]
 mod tests {
-    use super::super::counting::{Counted, madds};
     use super::*;
     use crate::geometry::{Cull, MovingVertex};
     use crate::random::{mix, unit};
@@ -366,48 +445,70 @@ mod tests {
     const SHEAR: Shear = Shear::new([9.0, -9.0], [2.0, -2.0]);
     const TILE: TileRect = TileRect { x: [-1.0, 1.0], y: [-1.0, 1.0] };
 
-    fn counted<const N: usize>(values: [f64; N]) -> [Counted; N] {
-        values.map(Counted)
+    fn part(lens: bool) -> Box5 {
+        Box5 { u: [-0.5, 0.5], v: [-0.5, 0.5], t: [0.25, 0.5], ..Box5::whole(lens) }
     }
 
-    fn counting(facts: &Facts<f64>) -> Facts<Counted> {
-        Facts {
-            open: facts.open.map(counted),
-            delta: facts.delta.map(counted),
-            moving: facts.moving,
-            size: counted(facts.size),
-            slack: counted(facts.slack),
-            s: counted(facts.s),
-            a: counted(facts.a),
-            parallel: facts.parallel,
+    /// What the choice of tests expects is what is counted where every plane gives a bound.
+    #[test]
+    fn expected_multiply_adds_are_those_of_the_code() {
+        let costs = Costs::default();
+        for (bound, moving, lens) in all() {
+            for parallel in [false, true] {
+                let (triangle, shear) = (triangle(moving), Shear { parallel, ..SHEAR });
+                let (bounder, set_up) = Bounder::counted(&triangle, &shear, bound, Some(&costs));
+                assert_eq!(set_up, set_up_madds(bound, moving), "{bound:?} {moving}");
+                let within = part(lens);
+                let (found, over) = bounder.over_counted(&TILE, &within, Some(&costs));
+                assert_eq!(over, interval_madds(bound, moving, lens), "{bound:?} {moving} {lens} {parallel}");
+                assert_eq!(found, bounder.over(&TILE, &within));
+            }
         }
     }
 
+    /// A triangle whose facing may change has no margin, which ends the work. In conservative mode each plane that may
+    /// be seen edge-on ends the work on it.
     #[test]
-    fn multiply_adds_are_those_of_the_code() {
-        for ((bound, moving, lens), parallel) in
-            all().flat_map(|one| [false, true].map(|parallel| (one, parallel)))
-        {
-            if !bound.has_planes() {
-                continue;
+    fn less_is_counted_where_there_are_no_bounds() {
+        let (costs, within) = (Costs::remembered(), part(true));
+        let madds = |shear: &Shear| {
+            let (bounder, _) =
+                Bounder::counted(&triangle(true), shear, DepthBound::LocalPlanes, Some(&costs));
+            let (exact, _) = ExactBounder::new(&triangle(true), shear, Some(&costs));
+            let over = bounder.over_counted(&TILE, &within, Some(&costs)).1;
+            [over, exact.over(&TILE, &within, 0.01, Some(&costs)).1]
+        };
+        let (all, less) = (madds(&SHEAR), madds(&Shear::new([9.0, -9.0], [400.0, -400.0])));
+        assert_eq!(all[0], interval_madds(DepthBound::LocalPlanes, true, true));
+        assert!(less[0] < all[0] && less[1] < all[1], "{less:?} {all:?}");
+    }
+
+    /// Costs that are remembered by path are those of counting each time.
+    #[test]
+    fn multiply_adds_follow_from_the_path() {
+        let (known, none, mut r) = (Costs::remembered(), Costs::default(), Uniform(5));
+        for n in 0..2000 {
+            let moving = n % 2 == 0;
+            let shear = Shear { parallel: n % 3 == 0, ..SHEAR };
+            let mut triangle = triangle(moving);
+            for corner in &mut triangle.corners {
+                corner.open =
+                    [r.within(-6.0, 6.0), r.within(-6.0, 6.0), r.within(-1.0, 4.0)].map(|x| x as f32);
             }
-            let shear = Shear { parallel, ..SHEAR };
-            let facts = counting(&Facts::new(&triangle(moving), &shear));
-            let mut shutter = None;
-            let set_up =
-                madds(|| shutter = (bound == DepthBound::Planes || !moving).then(|| facts.shutter()));
-            assert_eq!(set_up, set_up_madds(bound, moving), "set-up, {bound:?} {moving}");
-            let lens_box = lens.then(|| [counted([-0.5, 0.5]); 2]);
-            let region = Region { tile: [counted([-1.0, 1.0]); 2], lens: lens_box, t: counted([0.25, 0.5]) };
-            let mut found = None;
-            let over = madds(|| found = facts.over(shutter.as_ref(), &region));
-            assert!(found.is_some());
-            // The vertices at the ends of the interval are computed in any case.
-            assert_eq!(over, interval_madds(bound, moving, lens), "tile, {bound:?} {moving} {lens}");
-            if bound == DepthBound::LocalPlanes {
-                let exact = madds(|| _ = facts.exact(shutter.as_ref(), &region, Counted(0.01)));
-                assert_eq!(exact, exact_interval_madds(moving, lens), "exact, {moving} {lens}");
+            let lo = r.within(-1.0, 0.5);
+            let within = Box5 { t: [0.25, 0.5], u: [lo as f32, 0.6], ..Box5::whole(n % 5 < 2) };
+            for bound in DepthBound::ALL {
+                let all = [&known, &none].map(|costs| {
+                    let (bounder, set_up) = Bounder::counted(&triangle, &shear, bound, Some(costs));
+                    (set_up, bounder.over_counted(&TILE, &within, Some(costs)))
+                });
+                assert_eq!(all[0], all[1], "{n} {bound:?}");
             }
+            let [first, second] = [&known, &none].map(|costs| {
+                let (bounder, set_up) = ExactBounder::new(&triangle, &shear, Some(costs));
+                (set_up, bounder.over(&TILE, &within, 0.01, Some(costs)))
+            });
+            assert_eq!(first, second, "{n}");
         }
     }
 
@@ -435,9 +536,9 @@ mod tests {
         assert_eq!(over(DepthBound::LocalPlanes), over(DepthBound::VerticesInTime));
     }
 
-    struct Numbers(u64);
+    struct Uniform(u64);
 
-    impl Numbers {
+    impl Uniform {
         fn within(&mut self, lo: f64, hi: f64) -> f64 {
             self.0 += 1;
             lo + (hi - lo) * unit(mix(self.0))
@@ -464,7 +565,7 @@ mod tests {
 
     #[test]
     fn area_and_extent_hold_over_the_whole_box() {
-        let (mut r, mut certain, mut turned_twice) = (Numbers(1), 0, 0);
+        let (mut r, mut certain, mut turned_twice) = (Uniform(1), 0, 0);
         for _ in 0..3000 {
             let ends = [r.points(6.0), r.points(6.0)];
             let slopes = [0, 1].map(|_| {
@@ -491,7 +592,7 @@ mod tests {
     /// within the margin of a triangle whose vertices are exact.
     #[test]
     fn weights_are_off_by_no_more_than_the_margin() {
-        let (mut r, mut checked, mut closest) = (Numbers(2), 0, 0.0_f64);
+        let (mut r, mut checked, mut closest) = (Uniform(2), 0, 0.0_f64);
         for _ in 0..400_000 {
             let thin = r.within(-12.0, 0.0).exp2();
             let p = r.points(1.0).map(|[x, y, _]| [x as f32, (x + thin * y) as f32, 1.0]);

@@ -31,8 +31,8 @@ mod grid;
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
 use crate::tally::{Branches, Counting, Path, Tally};
-pub use bound::{Bounder, DepthBound, interval_madds, set_up_madds, vertex_range};
-pub(crate) use bound::{ExactBounder, exact_interval_madds};
+pub use bound::{Bounder, DepthBound, vertex_range};
+pub(crate) use bound::{ExactBounder, interval_madds, set_up_madds};
 pub use boxes::{DepthBoxes, DepthTile, Visible};
 pub use grid::{BoxGrid, DepthSpec, Pyramid};
 
@@ -117,6 +117,16 @@ pub(crate) trait Numbers: Branches {
     fn number(self, value: f64) -> Self::Number;
 }
 
+/// Plain numbers, whose branches are not recorded.
+impl Numbers for () {
+    type Number = f64;
+
+    #[inline(always)]
+    fn number(self, value: f64) -> f64 {
+        value
+    }
+}
+
 /// Plain numbers.
 impl Numbers for &Path {
     type Number = f64;
@@ -162,65 +172,6 @@ fn hull<R: Real>(a: [R; 2], b: [R; 2]) -> [R; 2] {
     [a[0].smaller(b[0]), a[1].larger(b[1])]
 }
 
-#[cfg(test)]
-mod counting {
-    use super::Real;
-    use std::cell::Cell;
-    use std::ops::{Add, Div, Mul, Neg, Sub};
-
-    thread_local!(static MADDS: Cell<u32> = const { Cell::new(0) });
-
-    /// A number that counts multiply-adds; a separate addition, multiplication or division counts as one.
-    #[derive(Clone, Copy, Debug, PartialEq, PartialOrd)]
-    pub struct Counted(pub f64);
-
-    fn count(value: f64) -> Counted {
-        MADDS.set(MADDS.get() + 1);
-        Counted(value)
-    }
-
-    /// Multiply-adds of `work`.
-    pub fn madds(work: impl FnOnce()) -> u32 {
-        MADDS.set(0);
-        work();
-        MADDS.get()
-    }
-
-    macro_rules! operator {
-        ($($name:ident $method:ident $op:tt),*) => {$(
-            impl $name for Counted {
-                type Output = Self;
-                fn $method(self, other: Self) -> Self {
-                    count(self.0 $op other.0)
-                }
-            }
-        )*};
-    }
-
-    operator!(Add add +, Sub sub -, Mul mul *, Div div /);
-
-    impl Neg for Counted {
-        type Output = Self;
-        fn neg(self) -> Self {
-            Self(-self.0)
-        }
-    }
-
-    impl Real for Counted {
-        fn new(value: f64) -> Self {
-            Self(value)
-        }
-
-        fn value(self) -> f64 {
-            self.0
-        }
-
-        fn madd(self, b: Self, c: Self) -> Self {
-            count(self.0 * b.0 + c.0)
-        }
-    }
-}
-
 /// Three points.
 pub type Points<R> = [[R; 3]; 3];
 
@@ -258,16 +209,14 @@ impl<R: Real> LensRays<R> {
     /// Rays through the part `lens` (ranges of u and v) of a thin lens with the shear `s`, `a`.
     pub fn lens(tile: [[R; 2]; 2], lens: [[R; 2]; 2], s: [R; 2], a: [R; 2]) -> Self {
         Self::corners(lens, |axis, position| {
-            let ([lo, hi], shift) = (tile[axis], position * a[axis]);
-            ([lo - shift, hi - shift], [position * s[axis]; 2])
+            (tile[axis].map(|end| end - position * a[axis]), [position * s[axis]; 2])
         })
     }
 
     /// Rays of an orthographic view with the same arguments.
     pub fn oblique(tile: [[R; 2]; 2], lens: [[R; 2]; 2], s: [R; 2], a: [R; 2]) -> Self {
         Self::corners(lens, |axis, position| {
-            let ([lo, hi], shift) = (tile[axis], position * s[axis]);
-            ([-(position * a[axis]); 2], [lo + shift, hi + shift])
+            ([-(position * a[axis]); 2], tile[axis].map(|end| end + position * s[axis]))
         })
     }
 
@@ -318,6 +267,18 @@ fn noise<R: Real>(normal: [R; 3], size: [R; 3]) -> R {
     R::new(ROUNDING).madd(dot(normal.map(R::magnitude), size), R::new(UNDERFLOW))
 }
 
+impl MovingPlane<f64> {
+    /// The plane in other numbers.
+    fn on<N: Numbers>(&self, numbers: N) -> MovingPlane<N::Number> {
+        let number = |value| numbers.number(value);
+        MovingPlane {
+            normal: self.normal.map(number),
+            ends: self.ends.map(|range| range.map(number)),
+            noise: number(self.noise),
+        }
+    }
+}
+
 impl<R: Real> MovingPlane<R> {
     /// The plane with `normal` for a triangle with the given vertices at the two ends; `size` bounds their
     /// magnitudes by axis.
@@ -343,7 +304,13 @@ impl<R: Real> MovingPlane<R> {
 
     /// Depth range in which a ray of the beam meets points with `n . p` in `reach` that are at most `off`
     /// from the ray in x and y. `None` if the plane may be seen edge-on, which gives no bound.
-    pub fn depths(&self, reach: [R; 2], beam: &LensRays<R>, off: [R; 2]) -> Option<[R; 2]> {
+    pub(crate) fn depths(
+        &self,
+        path: impl Branches,
+        reach: [R; 2],
+        beam: &LensRays<R>,
+        off: [R; 2],
+    ) -> Option<[R; 2]> {
         let [nx, ny, _] = self.normal;
         let slack = nx.magnitude().madd(off[0], ny.magnitude().madd(off[1], self.noise));
         let reach = [reach[0] - slack, reach[1] + slack];
@@ -356,6 +323,7 @@ impl<R: Real> MovingPlane<R> {
                 None => found,
                 Some((known, before)) => found.filter(|_| before == front).map(|found| hull(known, found)),
             };
+            path.branch(found.is_some());
             depths = Some((found?, front));
         }
         depths.map(|(depths, _)| depths)
@@ -367,8 +335,8 @@ impl<R: Real> MovingPlane<R> {
         let (x, y) = (by_sign(nx, slope[0]), by_sign(ny, slope[1]));
         let size = |slope: [R; 2]| slope[0].magnitude().larger(slope[1].magnitude());
         let sum = nx.magnitude().madd(size(slope[0]), ny.magnitude().madd(size(slope[1]), nw.magnitude()));
-        let noise = R::new(ROUNDING) * sum;
-        [nx.madd(x[0], ny.madd(y[0], nw)) - noise, nx.madd(x[1], ny.madd(y[1], nw)) + noise]
+        let noise = || R::new(ROUNDING) * sum;
+        [nx.madd(x[0], ny.madd(y[0], nw)) - noise(), nx.madd(x[1], ny.madd(y[1], nw)) + noise()]
     }
 
     /// Range of `n . B`, rounding included.
@@ -376,8 +344,9 @@ impl<R: Real> MovingPlane<R> {
         let [nx, ny, _] = self.normal;
         let (x, y) = (by_sign(nx, base[0]), by_sign(ny, base[1]));
         let size = |base: [R; 2]| base[0].magnitude().larger(base[1].magnitude());
-        let noise = R::new(ROUNDING) * nx.magnitude().madd(size(base[0]), ny.magnitude() * size(base[1]));
-        [nx.madd(x[0], ny * y[0]) - noise, nx.madd(x[1], ny * y[1]) + noise]
+        let sum = nx.magnitude().madd(size(base[0]), ny.magnitude() * size(base[1]));
+        let noise = || R::new(ROUNDING) * sum;
+        [nx.madd(x[0], ny * y[0]) - noise(), nx.madd(x[1], ny * y[1]) + noise()]
     }
 }
 
@@ -437,12 +406,12 @@ mod tests {
     fn a_triangle_parallel_to_the_screen_is_bounded_by_its_depth() {
         let plane = MovingPlane::new(normal(&OPEN), [&OPEN, &CLOSE], SIZE);
         let beam = LensRays::pinhole(TILE);
-        close_to(plane.depths(plane.whole(), &beam, [0.0; 2]).unwrap(), [2.0, 4.0]);
-        close_to(plane.depths(plane.within([0.25, 0.5]), &beam, [0.0; 2]).unwrap(), [2.5, 3.0]);
+        close_to(plane.depths((), plane.whole(), &beam, [0.0; 2]).unwrap(), [2.0, 4.0]);
+        close_to(plane.depths((), plane.within([0.25, 0.5]), &beam, [0.0; 2]).unwrap(), [2.5, 3.0]);
         let lens = LensRays::lens(TILE, [[-1.0, 1.0]; 2], [3.0, -3.0], [0.5, -0.5]);
-        close_to(plane.depths(plane.within([0.25, 0.5]), &lens, [0.0; 2]).unwrap(), [2.5, 3.0]);
+        close_to(plane.depths((), plane.within([0.25, 0.5]), &lens, [0.0; 2]).unwrap(), [2.5, 3.0]);
         let parallel = LensRays::orthographic(TILE);
-        close_to(plane.depths(plane.within([0.25, 0.5]), &parallel, [0.0; 2]).unwrap(), [2.5, 3.0]);
+        close_to(plane.depths((), plane.within([0.25, 0.5]), &parallel, [0.0; 2]).unwrap(), [2.5, 3.0]);
     }
 
     /// The plane w = 4 + x has depth 4 / (1 - X) at X, and 4 + X in parallel light.
@@ -450,7 +419,7 @@ mod tests {
     fn a_slanted_plane_is_bounded_at_the_corners_of_the_tile() {
         let points = [[0.0, 0.0, 4.0], [1.0, 0.0, 5.0], [0.0, 1.0, 4.0]];
         let plane = MovingPlane::new(normal(&points), [&points, &points], [1.0, 1.0, 5.0]);
-        let depths = |beam: &LensRays<f64>| plane.depths(plane.whole(), beam, [0.0; 2]);
+        let depths = |beam: &LensRays<f64>| plane.depths((), plane.whole(), beam, [0.0; 2]);
         close_to(depths(&LensRays::pinhole(TILE)).unwrap(), [4.0 / 1.5, 8.0]);
         close_to(depths(&LensRays::orthographic(TILE)).unwrap(), [3.5, 4.5]);
         assert!(depths(&LensRays::pinhole([[0.5, 1.5], [0.0, 1.0]])).is_none(), "seen edge-on at X = 1");
@@ -474,7 +443,7 @@ mod tests {
         let beam = LensRays::oblique(TILE, [[-1.0, 0.5], [0.0, 0.0]], [2.0, 2.0], [0.5, 0.5]);
         let at = |x: f64, u: f64| (4.0 + x + 2.0 * u) / (1.0 + 0.5 * u);
         let corners = range([at(-0.5, -1.0), at(0.5, -1.0), at(-0.5, 0.5), at(0.5, 0.5)]);
-        close_to(plane.depths(plane.whole(), &beam, [0.0; 2]).unwrap(), corners);
+        close_to(plane.depths((), plane.whole(), &beam, [0.0; 2]).unwrap(), corners);
     }
 
     /// A bound that allowed only for rounding relative to the products would leave out a vertex.
@@ -486,7 +455,7 @@ mod tests {
         let size = [24.0 * units[0], 3.0 * units[1], 84.0 * units[2]];
         let plane = MovingPlane::new(normal(&points), [&points, &points], size);
         for [x, y, w] in points {
-            let found = plane.depths(plane.whole(), &LensRays::orthographic([[x; 2], [y; 2]]), [0.0; 2]);
+            let found = plane.depths((), plane.whole(), &LensRays::orthographic([[x; 2], [y; 2]]), [0.0; 2]);
             assert!(found.is_none_or(|[lo, hi]| lo <= w && w <= hi), "{w} in {found:?}");
         }
     }
@@ -498,9 +467,9 @@ mod tests {
         let plane = MovingPlane::new(normal(&points), [&points, &points], [1.0, 1.0, 5.0]);
         let tile = [[1.0, 1.2], [0.0, 0.1]];
         let from = |u| LensRays::lens(tile, [u, [0.0; 2]], [2.0; 2], [0.5; 2]);
-        assert!(plane.depths(plane.whole(), &from([1.0; 2]), [0.0; 2]).is_some());
-        assert!(plane.depths(plane.whole(), &from([-1.0; 2]), [0.0; 2]).is_some());
-        assert!(plane.depths(plane.whole(), &from([-1.0, 1.0]), [0.0; 2]).is_none());
+        assert!(plane.depths((), plane.whole(), &from([1.0; 2]), [0.0; 2]).is_some());
+        assert!(plane.depths((), plane.whole(), &from([-1.0; 2]), [0.0; 2]).is_some());
+        assert!(plane.depths((), plane.whole(), &from([-1.0, 1.0]), [0.0; 2]).is_none());
     }
 
     #[test]

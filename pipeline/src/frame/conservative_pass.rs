@@ -363,6 +363,7 @@ fn log<S: TileShader>(
             &item.triangle,
             draw.grid,
             item.scissor.clone(),
+            lanes.costs(),
             |tile, touch, work: &mut TileLoop| {
                 let block = tile[1] / draw.block * across + tile[0] / draw.block;
                 *log.tests(primitive, block, lanes) += std::mem::take(work);

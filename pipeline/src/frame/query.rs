@@ -6,12 +6,13 @@ use glam::{Vec3, Vec4};
 
 use super::heat::Block;
 use super::{Draw, FrameReport, Gpu, PassError, Placement, Query, RasterPass};
-use crate::depth::{Bounder, DepthBound, Pyramid, interval_madds, set_up_madds};
+use crate::depth::{Bounder, DepthBound, Pyramid};
 use crate::geometry::{Cull, Geometry, MovingVertex, Projection};
 use crate::memory::{LINE_BYTES, MemoryRange};
 use crate::setup::{SetupResult, Triangle, bounds, set_up_counted};
 use crate::shader::{Lane, Shader, ShadingPoint};
 use crate::state::{Compare, DepthState, DrawState};
+use crate::tally::Costs;
 use crate::traversal::{Box5, TileRect, narrow_counted};
 
 /// An axis-aligned box whose corners move linearly.
@@ -95,11 +96,12 @@ impl IntervalAnswer {
 }
 
 /// Interval queries against one pyramid.
-#[derive(Clone, Copy, Debug)]
+#[derive(Debug)]
 pub struct IntervalQueries<'a> {
     pyramid: &'a Pyramid,
     projection: &'a Projection,
     bound: DepthBound,
+    costs: Costs,
 }
 
 /// A triangle of a box, after set-up.
@@ -111,7 +113,7 @@ struct Side {
 impl<'a> IntervalQueries<'a> {
     /// Makes queries against `pyramid`, whose depths were drawn through `projection`.
     pub fn new(pyramid: &'a Pyramid, projection: &'a Projection) -> Self {
-        Self { pyramid, projection, bound: DepthBound::LocalPlanes }
+        Self { pyramid, projection, bound: DepthBound::LocalPlanes, costs: Costs::remembered() }
     }
 
     /// Whether the box, and everything inside, is hidden. Ends at the first tile of the first level that may
@@ -136,8 +138,8 @@ impl<'a> IntervalQueries<'a> {
                 return true;
             };
             answer.triangles += 1;
-            answer.madds[2] += u64::from(set_up_madds(self.bound, triangle.moving));
-            let bounder = Bounder::new(&triangle, shear, self.bound);
+            let (bounder, madds) = Bounder::counted(&triangle, shear, self.bound, Some(&self.costs));
+            answer.madds[2] += u64::from(madds);
             self.triangle(&Side { triangle, bounder }, &mut answer)
         });
         answer
@@ -198,11 +200,11 @@ impl<'a> IntervalQueries<'a> {
         within: &Box5,
         answer: &mut IntervalAnswer,
     ) -> bool {
-        let madds = interval_madds(self.bound, side.triangle.moving, within.lens);
         self.pyramid.grid().overlapping(within).all(|(index, part)| {
+            let ([nearest, _], madds) = side.bounder.over_counted(rect, &part, Some(&self.costs));
             answer.compared += 1;
             answer.madds[2] += u64::from(madds);
-            side.bounder.over(rect, &part)[0] > self.pyramid.farthest(level, tile, index)
+            nearest > self.pyramid.farthest(level, tile, index)
         })
     }
 }

@@ -18,6 +18,7 @@ use crate::sampling::TileSamples;
 use crate::setup::{Corner, PixelRect, Triangle};
 use crate::shading::QuadSet;
 use crate::state::DrawState;
+use crate::tally::Costs;
 use crate::traversal::{Box5, Screen, TileRect};
 use crate::{sample_test, traversal};
 
@@ -35,6 +36,8 @@ pub(super) struct Scratch {
     /// Cells of the shaded samples of a packet.
     cells: Vec<[i32; 2]>,
     quads: QuadSet,
+    /// Multiply-adds of depth intervals.
+    costs: Costs,
 }
 
 /// A worker with its results so far.
@@ -60,6 +63,9 @@ impl<'a, 'p> BinWorker<'a, 'p> {
             tiles.resize_with(bin.tiles.len(), TileSamples::default);
             flags.clear();
             flags.resize(bin.tiles.len(), false);
+        }
+        if pass.settings.spec.depth.bound.has_planes() {
+            scratch.costs.remember();
         }
         let (log, tests) = (BinLog::default(), TileWork::default());
         Self { pass, bin, scratch, log, draw: Packet::NONE, listed: 0, tests, bounder: None }
@@ -577,16 +583,20 @@ impl BinWorker<'_, '_> {
         if stored.is_loaded() {
             self.bound_loaded(triangle.id, index);
         }
-        let mut visible = Visible::in_cleared(within, state.depth.test, self.pass.clear.depth);
-        if let (Some((_, bounder)), Some(tile)) = (&self.bounder, &mut self.bin.tiles[index]) {
+        let Some((_, bounder)) = &self.bounder else { return Some((*within, false)) };
+        let mut interval = |part: &Box5| {
+            let (depths, madds) = bounder.over_counted(rect, part, Some(&self.scratch.costs));
+            self.tests.interval_madds += madds;
+            depths.map(|depth| stored.round_depth(depth))
+        };
+        let visible = if let Some(tile) = &mut self.bin.tiles[index] {
             self.tests.z_updates += if features.z_max { tile.update() } else { 0 };
-            visible = tile.boxes.compare(within, state.depth.test, culls, |part| {
-                bounder.over(rect, part).map(|depth| stored.round_depth(depth))
-            });
-        }
+            tile.boxes.compare(within, state.depth.test, culls, interval)
+        } else {
+            interval(within);
+            Visible::in_cleared(within, state.depth.test, self.pass.clear.depth)
+        };
         self.tests.z_tests += visible.compared;
-        self.tests.interval_madds +=
-            visible.compared * interval_madds(depth.bound, triangle.moving, within.lens);
         if features.auto {
             self.record_depth(triangle, within, &visible);
         }
@@ -656,9 +666,10 @@ impl BinWorker<'_, '_> {
     /// Prepare the depth bounds of the triangle, once per bin.
     fn prepare(&mut self, triangle: &Triangle) {
         if self.bounder.as_ref().is_none_or(|(id, _)| *id != triangle.id) {
-            let bound = self.pass.settings.spec.depth.bound;
-            self.tests.interval_madds += set_up_madds(bound, triangle.moving);
-            self.bounder = Some((triangle.id, Bounder::new(triangle, &self.pass.projection.shear, bound)));
+            let (bound, shear) = (self.pass.settings.spec.depth.bound, &self.pass.projection.shear);
+            let (bounder, madds) = Bounder::counted(triangle, shear, bound, Some(&self.scratch.costs));
+            self.tests.interval_madds += madds;
+            self.bounder = Some((triangle.id, bounder));
         }
     }
 }

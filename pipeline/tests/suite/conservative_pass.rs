@@ -6,9 +6,10 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use crate::common::*;
 use activity::{Counts, Event, PacketKind, Waits};
 use glam::Vec3;
-use pipeline::conservative::{Grid, MovingTriangle, Rasterizer, View};
+use pipeline::conservative::{Grid, MovingTriangle, Rasterizer, TileLoop, Touch, View};
 use pipeline::memory::MemoryRange;
 use pipeline::random::{mix, unit};
+use pipeline::tally::Costs;
 use pipeline::*;
 
 const GRID: Grid = Grid { origin: [0.0, 0.0], tile: [1.0; 2], columns: 8, rows: 8 };
@@ -165,10 +166,12 @@ fn tiles_without_depths_have_those_with() {
         let triangle = MovingTriangle::new([0, 1, 2].map(corner), [3, 4, 5].map(corner)).unwrap();
         let tiles = |rasterizer: Rasterizer| {
             let (mut tiles, mut madds) = (Vec::new(), 0);
-            let rest = rasterizer.rasterize_counted(&triangle, &GRID, [0..8, 0..8], |tile, touch, work| {
+            let each = |tile, touch: &Touch, work: &mut TileLoop| {
                 madds += std::mem::take(work).depth_madds;
                 tiles.push((tile, *touch));
-            });
+            };
+            let costs = Costs::default();
+            let rest = rasterizer.rasterize_counted(&triangle, &GRID, [0..8, 0..8], &costs, each);
             (tiles, madds + rest.depth_madds)
         };
         let (with, madds) = tiles(Rasterizer::new(view));
