@@ -15,7 +15,7 @@ use super::uses::Uses;
 use crate::buffer::{Access, Buffer, BufferBinding, Stored, Word};
 use crate::compute::{self, ComputeError, ComputePass, ComputeSpec, GroupLog, SurfaceView, Touched};
 use crate::geometry::Viewport;
-use crate::memory::{LINE_BYTES, MemorySystem};
+use crate::memory::MemorySystem;
 use crate::surface::{Format, Layout, SurfaceSpec};
 
 /// Groups that run before their packets are emitted.
@@ -136,9 +136,6 @@ fn touch(memory: &mut MemorySystem, address: u64, how: Touched, counts: &mut Pac
     }
 }
 
-/// Bytes of a pixel of an image.
-const PIXEL_BYTES: u64 = 4;
-
 impl Gpu<'_> {
     /// Draws an image in a pass of its own: `pixel` gives the colour of the pixel at a column and row. What
     /// its lanes do is counted as they do it, in quads of 2 x 2 pixels: the n-th programs of the lanes of a
@@ -222,29 +219,6 @@ impl Gpu<'_> {
             }
         }
         Ok(values)
-    }
-
-    /// Writes the pixels of an image of `viewport` in a pass of its own, in tiles.
-    ///
-    /// # Errors
-    /// [`PassError::Stopped`] and [`PassError::Memory`].
-    pub fn write_image(&mut self, name: &str, viewport: Viewport) -> Result<(), PassError> {
-        let image = self.allocate(viewport.pixels() as u64 * PIXEL_BYTES);
-        self.check_frame(name)?;
-        self.open(name, Some(viewport));
-        let (pixels, tile_pixels) = (viewport.pixels() as u64, u64::from(self.spec().tile_px.pow(2)));
-        for (tile, first) in (0..).zip((0..pixels).step_by(tile_pixels as usize)) {
-            let count = tile_pixels.min(pixels - first);
-            let mut packet = self.packet(PacketKind::Resolve, tile, None);
-            packet.counts[Event::PixelsResolved] = count as u32;
-            let (from, counts) = (image.address() + first * PIXEL_BYTES, &mut packet.counts);
-            for line in from / LINE_BYTES..=(from + count * PIXEL_BYTES - 1) / LINE_BYTES {
-                self.memory().colour(line * LINE_BYTES, true, true, counts);
-            }
-            self.push(&packet, 0);
-        }
-        self.keep(image);
-        Ok(())
     }
 
     /// A packet of the pass that was begun.

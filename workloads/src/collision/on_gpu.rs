@@ -1,4 +1,4 @@
-//! The passes of collision detection on the modelled hardware, in conservative mode, and their image.
+//! The passes of collision detection on the modelled hardware, in conservative mode, and a picture of them.
 
 use glam::Vec3;
 use pipeline::memory::MemoryRange;
@@ -56,7 +56,7 @@ impl BoxLayout {
     }
 }
 
-/// Draws the passes on a GPU, and their image.
+/// Draws the passes on a GPU, with a picture of them.
 pub(super) struct PassesOnGpu<'a, 'e> {
     gpu: &'a mut Gpu<'e>,
     pass: ConservativePass,
@@ -64,7 +64,6 @@ pub(super) struct PassesOnGpu<'a, 'e> {
     /// Vertices of each object.
     vertices: Vec<MemoryRange>,
     picture: Picture,
-    viewport: Viewport,
     layout: BoxLayout,
     /// Boxes of the first and of the second object.
     boxes: [MemoryRange; 2],
@@ -77,14 +76,14 @@ pub(super) struct PassesOnGpu<'a, 'e> {
     refused: Option<PassError>,
 }
 
-/// Image and number of fragments of the passes.
+/// Picture and number of fragments of the passes.
 pub(super) struct Emitted {
     pub image: Vec<Vec3>,
     pub fragments: u64,
 }
 
 impl<'a, 'e> PassesOnGpu<'a, 'e> {
-    /// Makes passes with square images of `viewport` and `bins` boxes in a pixel.
+    /// Makes passes of the size of `viewport`, a square, with `bins` boxes in a pixel.
     pub fn new(
         (method, viewport, bins): (CollisionMethod, Viewport, u32),
         objects: &'a [Object],
@@ -103,7 +102,6 @@ impl<'a, 'e> PassesOnGpu<'a, 'e> {
             objects,
             vertices,
             picture,
-            viewport,
             layout,
             boxes,
             answers,
@@ -135,17 +133,13 @@ impl<'a, 'e> PassesOnGpu<'a, 'e> {
         (self.answered - 1) * ANSWER_BYTES
     }
 
-    /// Writes the image and returns the totals.
+    /// The totals, with a picture of them for people, which is no work of the GPU.
     ///
     /// # Errors
     /// [`PassError`] if the GPU refused a pass.
     pub fn finish(self) -> Result<Emitted, PassError> {
-        let (image, side) = (self.picture.image(), self.viewport.width());
-        let passes = self.drawn()?;
-        if let Some(all) = Viewport::new(3 * side, side) {
-            passes.gpu.write_image("image", all)?;
-        }
-        Ok(Emitted { image, fragments: passes.fragments })
+        let image = self.picture.image();
+        Ok(Emitted { image, fragments: self.into_fragments()? })
     }
 
     /// The number of fragments, without an image.
