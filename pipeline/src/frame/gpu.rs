@@ -9,6 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use super::attachments::{Attachments, PassError, Store, SurfaceId, Surfaces};
 use super::heat::{Block, FrameHeat, HeatMap, Placement};
+use super::order::{Emit, PacketOrder};
 use super::pass::{AddressMap, Draw, Pass, RasterPass, Resident, Target, resident};
 use super::replay::Replay;
 use super::seen::Seen;
@@ -19,17 +20,15 @@ use crate::geometry::Viewport;
 use crate::memory::{AddressSpace, MemoryRange, MemorySystem};
 use crate::surface::{SurfaceSpec, Texels};
 
-/// Receiver of packets, each with the lines it requests from the L2.
-type Emit<'e> = Box<dyn FnMut(&Packet, &[LineAccess]) + 'e>;
-
 /// The modelled GPU during a frame. It draws passes in order and emits every work packet, in the order of the
-/// hardware, with the lines that the packet requests from the L2. Results and packets are the same for any
-/// number of threads.
+/// hardware, with the lines that the packet requests from the L2. The front end of a pass comes before the tiles of
+/// the pass before unless a barrier is between them, as it works beside them. The last packets are emitted by
+/// [`Self::finish`]. Results and packets are the same for any number of threads.
 pub struct Gpu<'e> {
     spec: &'e PipelineSpec,
     pub(super) memory: MemorySystem,
     space: AddressSpace,
-    emit: Emit<'e>,
+    order: PacketOrder<'e>,
     passes: Vec<PassReport>,
     /// Results of passes, which are in memory when the frame ends.
     results: Vec<MemoryRange>,
@@ -175,14 +174,17 @@ impl<'e> Gpu<'e> {
         spec: &'e PipelineSpec,
         emit: impl FnMut(&Packet, &[LineAccess]) + 'e,
     ) -> Result<Self, PassError> {
-        let emit = Box::new(emit);
+        Self::receiving(spec, Some(Box::new(emit)))
+    }
+
+    fn receiving(spec: &'e PipelineSpec, emit: Option<Emit<'e>>) -> Result<Self, PassError> {
         let memory = MemorySystem::new(&spec.memory)?;
         let (passes, results, pending, reads, buffers, heat) = Default::default();
         Ok(Self {
             spec,
             memory,
             space: AddressSpace::default(),
-            emit,
+            order: PacketOrder::new(emit),
             passes,
             results,
             pending,
@@ -229,7 +231,7 @@ impl<'e> Gpu<'e> {
     /// # Errors
     /// As [`Self::new`].
     pub fn without_packets(spec: &'e PipelineSpec) -> Result<Self, PassError> {
-        Self::new(spec, |_, _| ())
+        Self::receiving(spec, None)
     }
 
     /// A GPU for images alone. The visibility engine finds what samples see, faster than the model of the
@@ -396,7 +398,7 @@ impl<'e> Gpu<'e> {
             report.triangles += triangles;
             report.add(packet);
         }
-        (self.emit)(packet, self.memory.log());
+        self.order.push(packet, self.memory.log());
         self.memory.clear_log();
     }
 
@@ -452,7 +454,7 @@ impl<'e> Gpu<'e> {
     }
 
     fn pass(&mut self, prepared: &Pass<'_>, pass: &RasterPass<'_>) -> Result<Rendered, PassError> {
-        let (emit, report) = (&mut self.emit, &mut self.passes[prepared.number as usize]);
+        let (order, report) = (&mut self.order, &mut self.passes[prepared.number as usize]);
         let heat = &mut self.heat;
         let mut done = |work: Finished<'_>| match work {
             Finished::Packet(packet, lines) => {
@@ -462,7 +464,7 @@ impl<'e> Gpu<'e> {
                 } else {
                     heat.drawn_at(packet, || pass.places_of(packet.tile));
                 }
-                emit(packet, lines);
+                order.push(packet, lines);
             }
             Finished::Tests(number, bin, log) if prepared.heat => heat.tests(prepared, number, bin, log),
             Finished::Tests(..) => {}
@@ -548,7 +550,8 @@ impl<'e> Gpu<'e> {
         let mut counts = PacketCounts::default();
         self.memory.finish(&self.results, &mut counts);
         let packet = Packet { counts, ..Packet::new(PacketKind::Resolve, self.passes.len() as u32) };
-        (self.emit)(&packet, self.memory.log());
+        self.order.push(&packet, self.memory.log());
+        self.order.release();
         self.heat.begin(None);
         self.heat.add(&packet, false);
         let mut write_back = Counts::default();

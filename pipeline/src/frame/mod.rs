@@ -12,6 +12,7 @@ mod fragments;
 mod gpu;
 mod heat;
 mod lanes;
+mod order;
 mod pass;
 mod query;
 mod replay;

@@ -196,8 +196,8 @@ impl<'a> Slice<'a> {
 
 /// Writer of [`Slices`].
 ///
-/// The front end of a batch comes in the stream before all tiles of the batch before, and works at the same time. So its
-/// packets are put between these tiles, by the time that they take.
+/// The front end of a batch comes in the stream before all tiles of the batch before, of its pass or of the pass before,
+/// and works at the same time. So its packets are put between these tiles, by the time that they take.
 #[derive(Clone, Debug, Default)]
 pub struct SliceWriter {
     slices: Slices,
@@ -216,8 +216,7 @@ impl SliceWriter {
         self.beside += weight((packet, lines));
         while let Some((front, fetched)) = self.ahead.front() {
             let own = FRONT_END_FACTOR * weight((front, fetched));
-            let is_needed = front.pass < packet.pass
-                || front.batch <= packet.batch
+            let is_needed = (front.pass, front.batch) <= (packet.pass, packet.batch)
                 || matches!(packet.kind, PacketKind::Barrier(_));
             if !is_needed && own > self.beside {
                 break;

@@ -184,9 +184,10 @@ pub struct DemandBuilder {
     data_cycles: [[f64; DATA_EVENTS]; DataUnit::ALL.len()],
     /// Lines per cycle that each client of the L2 can request.
     lines_per_cycle: [u32; CLIENTS.len()],
-    /// Pass of the last packet, number of its first batch in the frame, and number of the last batch.
-    pass: u32,
-    first_batch: u32,
+    /// The last two passes, each with the number of its first batch in the frame: the front end of a pass comes before
+    /// the last tiles of the one before.
+    passes: [(u32, u32); 2],
+    /// Number of the last batch.
     last_batch: u32,
 }
 
@@ -205,8 +206,7 @@ impl DemandBuilder {
             costs,
             data_cycles: DataUnit::ALL.map(|unit| unit.events().map(cycles)),
             lines_per_cycle: CLIENTS.map(|unit| machine.common(unit).lines_per_cycle),
-            pass: 0,
-            first_batch: 0,
+            passes: [(0, 0); 2],
             last_batch: 0,
         }
     }
@@ -315,10 +315,11 @@ impl DemandBuilder {
 
     /// Number of the packet's batch in the frame: batches of a pass follow those of the pass before.
     fn batch_of(&mut self, packet: &Packet) -> u32 {
-        if packet.pass != self.pass {
-            (self.pass, self.first_batch) = (packet.pass, self.last_batch + 1);
+        if self.passes.iter().all(|(pass, _)| *pass != packet.pass) {
+            self.passes = [self.passes[1], (packet.pass, self.last_batch + 1)];
         }
-        let batch = self.first_batch + packet.batch;
+        let first = self.passes.iter().find(|(pass, _)| *pass == packet.pass).map_or(0, |(_, first)| *first);
+        let batch = first + packet.batch;
         self.last_batch = self.last_batch.max(batch);
         batch
     }
