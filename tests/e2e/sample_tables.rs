@@ -154,7 +154,7 @@ fn heat_maps_of_passes_add_up_to_that_of_the_frame() {
         let ended = quintile().call([&["run", "tiny", "--heat", "joules@sceen"], more].concat());
         assert_eq!(ended.code, Some(2), "{}", ended.stderr);
         let frame = if more.contains(&"3..4") { 3 } else { 0 };
-        let expected = format!("frame {frame} has no such pass; it has scene");
+        let expected = format!("frame {frame} has no such pass; it has `scene`");
         assert!(ended.stderr.contains(&expected), "{}", ended.stderr);
     }
     let ended = quintile().call(["run", "tiny", "--heat", "joules@"]);

@@ -37,11 +37,13 @@ impl DepthBound {
 
 /// Multiply-adds of preparing a triangle. A still one has one plane, a moving one two. Methods that find their planes
 /// in every tile have none here. The choice of tests expects them before the work is done.
-pub(crate) const fn set_up_madds(bound: DepthBound, moving: bool) -> u32 {
+pub(crate) const fn set_up_madds(bound: DepthBound, moving: bool, lens: bool) -> u32 {
+    let sizes = if moving { 9 } else { 0 } + if lens { 2 } else { 0 };
     match (bound, moving) {
-        (DepthBound::Vertices | DepthBound::VerticesInTime, _) | (DepthBound::LocalPlanes, true) => 0,
-        (DepthBound::Planes | DepthBound::LocalPlanes, false) => 25,
-        (DepthBound::Planes, true) => 77,
+        (DepthBound::Vertices | DepthBound::VerticesInTime, _) => 0,
+        (DepthBound::Planes | DepthBound::LocalPlanes, false) => 25 + sizes,
+        (DepthBound::Planes, true) => 77 + sizes,
+        (DepthBound::LocalPlanes, true) => sizes,
     }
 }
 
@@ -58,10 +60,10 @@ pub(crate) const fn interval_madds(bound: DepthBound, moving: bool, lens: bool) 
     }
 }
 
-/// Multiply-adds of the depths of the vertices at the ends of a time interval. Methods with planes have them from the
-/// vertices of their planes.
+/// Multiply-adds of the depths of three vertices at both ends of a time interval, of [`vertex_range`]. Methods with planes
+/// have them from the vertices of their planes.
 const fn vertex_madds(bound: DepthBound, moving: bool) -> u32 {
-    if matches!(bound, DepthBound::VerticesInTime) && moving { 6 } else { 0 }
+    if matches!(bound, DepthBound::VerticesInTime) && moving { 2 * 3 } else { 0 }
 }
 
 /// Smallest and largest depth of the vertices of `triangle` for times in `t`. The depth at a sample is a
@@ -96,7 +98,7 @@ impl Bounder {
     ) -> (Self, u32) {
         let facts = bound.has_planes().then(|| Facts::new(triangle, shear));
         let early = bound == DepthBound::Planes || (bound == DepthBound::LocalPlanes && !triangle.moving);
-        let facts = facts.map(|facts| if early { facts.prepared(costs) } else { (facts, 0) });
+        let facts = facts.map(|facts| facts.prepared(early, costs));
         let madds = facts.map_or(0, |(_, madds)| madds);
         (Self { triangle: *triangle, bound, facts: facts.map(|(facts, _)| facts) }, madds)
     }
@@ -145,8 +147,7 @@ impl ExactBounder {
         shear: &Shear<C>,
         costs: Option<&Costs>,
     ) -> (Self, u32) {
-        let facts = Facts::new(triangle, shear);
-        let (facts, madds) = if triangle.moving { (facts, 0) } else { facts.prepared(costs) };
+        let (facts, madds) = Facts::new(triangle, shear).prepared(!triangle.moving, costs);
         (Self(facts), madds)
     }
 
@@ -221,24 +222,23 @@ impl Facts<f64> {
         let [s, a]: [[f64; 2]; 2] = [shear.s, shear.a].map(|part| part.map(Into::into));
         let open: Points<f64> = triangle.corners.map(|corner| corner.open.map(Into::into));
         let delta: Points<f64> = triangle.corners.map(|corner| corner.delta.map(Into::into));
-        let largest =
-            |axis: usize| (0..3).map(|k| open[k][axis].abs() + delta[k][axis].abs()).fold(0.0, f64::max);
-        let size = [largest(0) + s[0].abs(), largest(1) + s[1].abs(), largest(2)];
+        let size = [0.0; 3];
         let (moving, slack, parallel) = (triangle.moving, triangle.slack.map(Into::into), shear.parallel);
         Self { open, delta, moving, size, slack, s, a, parallel, shutter: None }
     }
 
-    /// With the planes at the ends of the shutter, and their multiply-adds if there are `costs` to count them with.
-    fn prepared(self, costs: Option<&Costs>) -> (Self, u32) {
-        let (planes, madds) = match costs {
-            None => (self.planes_of_shutter(()), 0),
+    /// With its size, and with the planes at the ends of the shutter if they are found in set-up. The multiply-adds are
+    /// counted if there are `costs` to count them with, else 0.
+    fn prepared(self, early: bool, costs: Option<&Costs>) -> (Self, u32) {
+        let ((size, shutter), madds) = match costs {
+            None => (self.prepare((), early), 0),
             Some(costs) => costs.run(
                 Kernel::Planes,
-                |path| self.planes_of_shutter(path),
-                |tally| _ = self.on(tally).planes_of_shutter(tally),
+                |path| self.prepare(path, early),
+                |tally| _ = self.on(tally).prepare(tally, early),
             ),
         };
-        (Self { shutter: Some(planes), ..self }, madds)
+        (Self { size, shutter, ..self }, madds)
     }
 
     fn on<N: Numbers>(&self, numbers: N) -> Facts<N::Number> {
@@ -258,6 +258,28 @@ impl Facts<f64> {
 }
 
 impl<R: Real> Facts<R> {
+    /// The size, and the planes at the ends of the shutter if they are found in set-up.
+    fn prepare(&self, path: impl Branches, early: bool) -> ([R; 3], Option<[MovingPlane<R>; 2]>) {
+        let size = self.largest(path);
+        let sized = Self { size, ..*self };
+        (size, path.branch(early).then(|| sized.planes_of_shutter(path)))
+    }
+
+    /// Largest magnitude on each axis at any time, seen from the lens.
+    fn largest(&self, path: impl Branches) -> [R; 3] {
+        let moving = path.branch(self.moving);
+        let sheared = path.branch(self.s.iter().any(|s| *s != R::new(0.0)));
+        let largest = |axis: usize| {
+            let magnitude = |k: usize| {
+                let open = self.open[k][axis].magnitude();
+                if moving { open + self.delta[k][axis].magnitude() } else { open }
+            };
+            (0..3).map(magnitude).fold(R::new(0.0), R::larger)
+        };
+        let [x, y, w] = [0, 1, 2].map(largest);
+        if sheared { [x + self.s[0].magnitude(), y + self.s[1].magnitude(), w] } else { [x, y, w] }
+    }
+
     fn at(&self, t: R) -> Points<R> {
         let mut points = self.open;
         for (point, delta) in points.iter_mut().zip(&self.delta) {
@@ -382,7 +404,9 @@ fn margin<R: Real>(ends: &[Points<R>], beam: &LensRays<R>, slack: [R; 2], deepes
     let unsure = R::new(13.0 * HALF_ULP).madd(wide * high, R::new(UNDERFLOW_LOSS));
     let rounded = R::new(3.0).madd(slack[0].madd(high, slack[1] * wide), unsure);
     let area = seen_area(ends, &slopes) - rounded;
-    if area <= R::new(0.0) || wide * high * deepest > R::new(OVERFLOW_LIMIT) {
+    // Both are computed in any case, as the multiply-adds of a path must not depend on more than its branches.
+    let (has_area, may_overflow) = (area > R::new(0.0), wide * high * deepest > R::new(OVERFLOW_LIMIT));
+    if !has_area || may_overflow {
         return None;
     }
     let half = R::new(0.5);
@@ -429,6 +453,7 @@ mod tests {
     use crate::geometry::{Cull, MovingVertex};
     use crate::random::{mix, unit};
     use crate::setup::{SetupResult, set_up};
+    use crate::tally::Tally;
 
     fn triangle(moving: bool) -> Triangle {
         let open = [[-40.0, -40.0, 4.0], [40.0, -30.0, 5.0], [0.0, 50.0, 6.0]];
@@ -455,14 +480,26 @@ mod tests {
         let costs = Costs::default();
         for (bound, moving, lens) in all() {
             for parallel in [false, true] {
-                let (triangle, shear) = (triangle(moving), Shear { parallel, ..SHEAR });
+                let shear = if lens { SHEAR } else { Shear::default() };
+                let (triangle, shear) = (triangle(moving), Shear { parallel, ..shear });
                 let (bounder, set_up) = Bounder::counted(&triangle, &shear, bound, Some(&costs));
-                assert_eq!(set_up, set_up_madds(bound, moving), "{bound:?} {moving}");
+                assert_eq!(set_up, set_up_madds(bound, moving, lens), "{bound:?} {moving}");
                 let within = part(lens);
                 let (found, over) = bounder.over_counted(&TILE, &within, Some(&costs));
                 assert_eq!(over, interval_madds(bound, moving, lens), "{bound:?} {moving} {lens} {parallel}");
                 assert_eq!(found, bounder.over(&TILE, &within));
             }
+        }
+    }
+
+    /// Depths are a third of the coordinates of the vertices.
+    #[test]
+    fn vertices_take_a_multiply_add_for_each_coordinate() {
+        for moving in [false, true] {
+            let (tally, facts) = (Tally::default(), Facts::new(&triangle(moving), &SHEAR));
+            let region = Region::new(&TILE, &part(false));
+            facts.on(&tally).ends(&tally, &region.on(&tally));
+            assert_eq!(tally.madds(), 3 * vertex_madds(DepthBound::VerticesInTime, moving));
         }
     }
 
@@ -491,9 +528,11 @@ mod tests {
             let moving = n % 2 == 0;
             let shear = Shear { parallel: n % 3 == 0, ..SHEAR };
             let mut triangle = triangle(moving);
+            // Products of the largest ones may overflow.
+            let scale = [1.0, 1e11, 1e13][n % 11 % 3];
             for corner in &mut triangle.corners {
-                corner.open =
-                    [r.within(-6.0, 6.0), r.within(-6.0, 6.0), r.within(-1.0, 4.0)].map(|x| x as f32);
+                let at = [r.within(-6.0, 6.0), r.within(-6.0, 6.0), r.within(-1.0, 4.0)];
+                corner.open = at.map(|x| (scale * x) as f32);
             }
             let lo = r.within(-1.0, 0.5);
             let within = Box5 { t: [0.25, 0.5], u: [lo as f32, 0.6], ..Box5::whole(n % 5 < 2) };

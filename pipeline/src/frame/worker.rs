@@ -649,7 +649,7 @@ impl BinWorker<'_, '_> {
         let samples = f64::from(self.samples_of_a_tile()) * Remaining::all(*within).volume(triangle.moving);
         let selector = &mut self.bin.selector;
         let known = self.bounder.as_ref().is_some_and(|(id, _)| *id == triangle.id);
-        let set_up = if known { 0 } else { set_up_madds(depth.bound, triangle.moving) };
+        let set_up = if known { 0 } else { set_up_madds(depth.bound, triangle.moving, within.lens) };
         let cost = interval_madds(depth.bound, triangle.moving, within.lens) + set_up;
         let test_madds = f64::from(sample_test::madds(triangle.moving, within.lens));
         let workload = samples * selector.sample_madds(test_madds);

@@ -219,7 +219,8 @@ fn dependent_dispatches_have_a_barrier_and_others_none() {
     let (read, write) = (false, true);
     let start = [PacketKind::Draw, PacketKind::Compute];
     let apart = [&start[..], &[PacketKind::Barrier(Waits::Tiles)], &start].concat();
-    let beside = [start, start].concat();
+    // The second dispatch begins beside the groups of the first.
+    let beside = [start[0], start[0], start[1], start[1]];
     assert_eq!(kinds(&[&[(0, read), (1, write)], &[(0, read), (2, write)]]), beside);
     assert_eq!(kinds(&[&[(0, write)], &[(0, read)]]), apart, "read after write");
     assert_eq!(kinds(&[&[(0, read)], &[(0, write)]]), apart, "write after read");

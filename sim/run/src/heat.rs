@@ -1,5 +1,7 @@
 //! Heat maps: counts of an event over the image, or the energy of all events, as files.
 
+use std::collections::BTreeSet;
+
 use activity::Event;
 use glam::Vec3;
 use pipeline::frame::{HeatMap, TileHeat};
@@ -61,12 +63,11 @@ pub(super) fn check_passes(
     frame: u32,
     report: &FrameReport,
 ) -> Result<(), RunError> {
-    let mut names: Vec<&str> = report.passes.iter().map(|pass| &*pass.name).collect();
-    let missing = requests.iter().find(|of| of.pass.as_deref().is_some_and(|pass| !names.contains(&pass)));
+    let names: BTreeSet<&str> = report.passes.iter().map(|pass| &*pass.name).collect();
+    let missing = requests.iter().find(|of| of.pass.as_deref().is_some_and(|pass| !names.contains(pass)));
     let Some(missing) = missing else { return Ok(()) };
-    names.sort_unstable();
-    names.dedup();
-    let why = format!("`{missing}`: frame {frame} has no such pass; it has {}", names.join(", "));
+    let quoted: Vec<String> = names.iter().map(|name| format!("`{name}`")).collect();
+    let why = format!("`{missing}`: frame {frame} has no such pass; it has {}", quoted.join(", "));
     Err(RunError::invalid("heat", why))
 }
 

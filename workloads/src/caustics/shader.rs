@@ -215,8 +215,8 @@ struct VolumeShader<'a> {
 
 impl GroupShader for VolumeShader<'_> {
     fn run(&self, group: &mut Group<'_>) {
-        let first = group.id()[0] * group.size();
-        group.lanes(|lane| self.volume(lane, first + lane.index()));
+        let (part, size) = (group.id()[0], group.size());
+        group.lanes(|lane| self.volume(lane, lane.madd(part, size, lane.index())));
     }
 }
 
@@ -226,15 +226,16 @@ impl VolumeShader<'_> {
         if lane.branch(beam as usize >= self.seen.len()) {
             return;
         }
-        for word in 0..BEAM_WORDS {
-            lane.load(self.beams, beam * BEAM_WORDS + word);
-        }
-        let Some(seen) = &self.seen[beam as usize] else { return };
+        let first = lane.mul(beam, BEAM_WORDS);
+        (first..first + BEAM_WORDS).for_each(|word| _ = lane.load(self.beams, word));
+        let seen = &self.seen[beam as usize];
+        lane.branch(seen.is_some());
+        let Some(seen) = seen else { return };
         let mut volume = BoundingVolume::new();
         self.method.bounding_volumes(lane, &seen.image, &mut volume);
         lane.atomic(self.count, 0, Atomic::Add, volume.len() as u32);
         let coordinates = volume.iter().flatten().flat_map(|corner| corner.to_array());
-        for (word, value) in (self.first[beam as usize] * FACE_WORDS..).zip(coordinates) {
+        for (word, value) in (lane.mul(self.first[beam as usize], FACE_WORDS)..).zip(coordinates) {
             lane.store(self.faces, word, value as f32);
         }
     }

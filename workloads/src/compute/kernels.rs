@@ -5,6 +5,7 @@
 
 use activity::{Counts, Event};
 use glam::Vec3;
+use pipeline::memory::AddressSpace;
 use pipeline::{
     Atomic, Buffer, BufferBinding, Camera, ComputeError, ComputePass, Gpu, Group, GroupLane, GroupShader,
     PassError, SurfaceView, Viewport,
@@ -131,10 +132,14 @@ impl<'a, 'e> Kernels<'a, 'e> {
         let ComputeOptions { depth_bounds, tile_px, group, list: capacity, .. } = *self.options;
         let blocks = Blocks::tiles(depth.size(), tile_px);
         let tiles = blocks.groups()[0] * blocks.groups()[1];
+        let bytes = 4 * u64::from(tiles) * u64::from(capacity);
+        if bytes > AddressSpace::MAX_BYTES {
+            return Err(PassError::Memory { pass: "light culling".to_owned(), bytes });
+        }
         let words = self.gpu.buffer("lights", &LightBuffer::values(lights, camera));
         let lists = Lists {
             counts: self.gpu.buffer("counts", &vec![0_u32; tiles as usize]),
-            lights: self.gpu.buffer("lists", &vec![0_u32; (tiles * capacity) as usize]),
+            lights: self.gpu.buffer("lists", &vec![0_u32; bytes as usize / 4]),
             capacity,
             most: self.gpu.buffer("most", &[0_u32]),
         };
