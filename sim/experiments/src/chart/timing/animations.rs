@@ -211,7 +211,7 @@ impl Variant {
 }
 
 /// Options that bring passes of other types.
-const VARIANTS: [Variant; 20] = [
+const VARIANTS: [Variant; 15] = [
     Variant::new("multiview", "view_by_view", &[("view_by_view", "true")]),
     Variant::new("soft-shadows", "accumulate", &[("accumulate", "true")]),
     Variant::new("compute", "mip_chain", &[("kernel", "mip_chain")]),
@@ -221,12 +221,7 @@ const VARIANTS: [Variant; 20] = [
     Variant::new("deferred", "volumes", &[("lighting", "volumes")]),
     Variant { samples: Some(4), ..Variant::new("deferred", "4 samples resolved", &[]) },
     Variant { samples: Some(4), ..Variant::new("deferred", "volumes, resolved", &[("lighting", "volumes")]) },
-    Variant::new("caustics", "hull", &[("method", "hull"), ("cells", "16")]),
     Variant::new("ccd", "narrow", &[("narrow", "true"), ("balls", "4")]),
-    Variant::new("ccd", "box_box", &[("method", "box_box"), ("resolution", "16")]),
-    Variant::new("ccd", "depth_only", &[("method", "depth_only"), ("resolution", "16")]),
-    Variant::new("glossy", "refraction", &[("index", "1.33")]),
-    Variant::new("sampling", "darts in 3D", &[("dimensions", "3")]),
     Variant::new("sampling", "noise", &[("points", "noise")]),
     Variant::new("sampling", "volume", &[("points", "volume")]),
     Variant::new("sampling", "volume in 5D", &[("points", "volume"), ("dimensions", "5")]),
