@@ -67,6 +67,13 @@ impl<'e> PacketOrder<'e> {
     }
 }
 
+/// A frame that is not finished emits what it has.
+impl Drop for PacketOrder<'_> {
+    fn drop(&mut self) {
+        self.release();
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use activity::Waits;
@@ -82,7 +89,6 @@ mod tests {
         for &(kind, pass, batch) in packets {
             order.push(&Packet { batch, ..Packet::new(kind, pass) }, &[]);
         }
-        order.release();
         drop(order);
         found
     }
