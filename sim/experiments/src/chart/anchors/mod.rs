@@ -4,7 +4,6 @@
 
 mod published;
 
-use std::cell::Cell;
 use std::sync::Arc;
 
 use activity::{LineAccess, Packet, S_PER_PS, Unit};
@@ -223,18 +222,12 @@ impl<'a> Stage<'a> {
     fn timed(&self) -> Result<Timed, StudyError> {
         let machine = self.gpu.machine().map_err(RunError::from)?;
         let mut clock = FrameClock::new(Level::Stepped, machine, Recorder::new(BIN_PS, MAX_BINS));
-        // What the caches hold at the end is as much for either image. Its write-back takes a time of its own, as its
-        // rows lie in other banks, so it is left out.
-        let is_drawn = Cell::new(false);
-        let emit = |packet: &Packet, lines: &[LineAccess]| {
-            if !is_drawn.get() {
-                clock.push(packet, lines);
-            }
-        };
+        let emit = |packet: &Packet, lines: &[LineAccess]| clock.push(packet, lines);
         let mut on = Gpu::new(&self.gpu.pipeline, emit)?;
         let amount = self.draw(&mut on)?;
-        is_drawn.set(true);
-        on.finish();
+        // What the caches hold at the end is as much for either image. Its write-back takes a time of its own, as its
+        // rows lie in other banks, so the frame is not finished.
+        drop(on);
         let timed = clock.finish().map_err(RunError::from)?;
         let ends: Vec<u64> = std::iter::once(0).chain(timed.passes.iter().map(|pass| pass.end_ps)).collect();
         let length_ps = ends.windows(2).last().map_or(0, |ends| ends[1] - ends[0]);
