@@ -92,7 +92,7 @@ pub(crate) enum Kernel {
     Inside,
     /// The times of a point in a moving triangle.
     Times,
-    /// The planes of a triangle at the ends of the shutter.
+    /// The size of a triangle, and its planes at the ends of the shutter.
     Planes,
     /// The depths of a triangle over a tile.
     Depths,

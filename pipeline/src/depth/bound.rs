@@ -96,11 +96,10 @@ impl Bounder {
         bound: DepthBound,
         costs: Option<&Costs>,
     ) -> (Self, u32) {
-        let facts = bound.has_planes().then(|| Facts::new(triangle, shear));
         let early = bound == DepthBound::Planes || (bound == DepthBound::LocalPlanes && !triangle.moving);
-        let facts = facts.map(|facts| facts.prepared(early, costs));
-        let madds = facts.map_or(0, |(_, madds)| madds);
-        (Self { triangle: *triangle, bound, facts: facts.map(|(facts, _)| facts) }, madds)
+        let prepared = || Facts::new(triangle, shear).prepared(early, costs);
+        let (facts, madds) = bound.has_planes().then(prepared).unzip();
+        (Self { triangle: *triangle, bound, facts }, madds.unwrap_or(0))
     }
 
     /// Interval of the depths of all samples in `tile` and `within` for which

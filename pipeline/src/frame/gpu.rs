@@ -22,8 +22,8 @@ use crate::surface::{SurfaceSpec, Texels};
 
 /// The modelled GPU during a frame. It draws passes in order and emits every work packet, in the order of the
 /// hardware, with the lines that the packet requests from the L2. The front end of a pass comes before the tiles of
-/// the pass before unless a barrier is between them, as it works beside them. The last packets are emitted by
-/// [`Self::finish`]. Results and packets are the same for any number of threads.
+/// the pass before unless a barrier is between them, as it works beside them. The last packets are emitted
+/// when it is dropped or finished. Results and packets are the same for any number of threads.
 pub struct Gpu<'e> {
     spec: &'e PipelineSpec,
     pub(super) memory: MemorySystem,
@@ -551,7 +551,6 @@ impl<'e> Gpu<'e> {
         self.memory.finish(&self.results, &mut counts);
         let packet = Packet { counts, ..Packet::new(PacketKind::Resolve, self.passes.len() as u32) };
         self.order.push(&packet, self.memory.log());
-        self.order.release();
         self.heat.begin(None);
         self.heat.add(&packet, false);
         let mut write_back = Counts::default();

@@ -57,7 +57,7 @@ impl<'e> PacketOrder<'e> {
     }
 
     /// Emits the tiles that are held.
-    pub fn release(&mut self) {
+    fn release(&mut self) {
         if self.held_at.take().is_none() {
             return;
         }
@@ -67,10 +67,12 @@ impl<'e> PacketOrder<'e> {
     }
 }
 
-/// A frame that is not finished emits what it has.
+/// At its end a frame emits what it holds, finished or not.
 impl Drop for PacketOrder<'_> {
     fn drop(&mut self) {
-        self.release();
+        if !std::thread::panicking() {
+            self.release();
+        }
     }
 }
 
